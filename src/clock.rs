@@ -1,0 +1,140 @@
+//! Wall and virtual time: the only room that reads a clock; the others are handed one.
+
+use std::time::{Duration, Instant};
+
+use crate::signal::Seconds;
+
+/// A source of time that can be waited on.
+pub trait Clock: Send {
+    /// The time since the clock started.
+    fn now(&self) -> Seconds;
+    /// Returns at `deadline` or, when that has passed, at once.
+    fn wait_until(&mut self, deadline: Seconds);
+    /// Whether the time is that of the wall, so that people and devices can take part.
+    fn is_wall(&self) -> bool;
+}
+
+/// Real time, from a monotonic clock. Copies share their start.
+#[derive(Clone, Copy, Debug)]
+pub struct WallClock {
+    start: Instant,
+}
+
+impl WallClock {
+    /// A clock that starts at 0 now.
+    #[must_use]
+    #[expect(clippy::disallowed_methods, reason = "the room that reads the clock")]
+    pub fn start() -> Self {
+        Self { start: Instant::now() }
+    }
+}
+
+impl Clock for WallClock {
+    #[expect(clippy::disallowed_methods, reason = "the room that reads the clock")]
+    fn now(&self) -> Seconds {
+        Seconds(Instant::now().duration_since(self.start).as_secs_f64())
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "the room that waits")]
+    fn wait_until(&mut self, deadline: Seconds) {
+        let left = deadline - self.now();
+        if left.0 > 0.0 {
+            std::thread::sleep(Duration::from_secs_f64(left.0));
+        }
+    }
+
+    fn is_wall(&self) -> bool {
+        true
+    }
+}
+
+/// Time that passes only when waited for: sessions run as fast as the machine goes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct VirtualClock {
+    now: Seconds,
+}
+
+impl Clock for VirtualClock {
+    fn now(&self) -> Seconds {
+        self.now
+    }
+
+    fn wait_until(&mut self, deadline: Seconds) {
+        if deadline > self.now {
+            self.now = deadline;
+        }
+    }
+
+    fn is_wall(&self) -> bool {
+        false
+    }
+}
+
+/// What waiting for a tick's deadline brought.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wake {
+    /// How long after its deadline the tick starts.
+    pub lateness: Seconds,
+    /// Ticks left out because their time had passed entirely.
+    pub missed: u64,
+}
+
+/// Absolute deadlines t0 + k·period. A missed tick is counted and left out, never caught
+/// up in a burst: a plant must not see several commands in a millisecond.
+#[derive(Clone, Copy, Debug)]
+pub struct Pacer {
+    period: Seconds,
+    next: Seconds,
+}
+
+impl Pacer {
+    /// Deadlines every `period`, the first one now.
+    #[must_use]
+    pub fn new(period: Seconds, clock: &dyn Clock) -> Self {
+        Self { period, next: clock.now() }
+    }
+
+    /// Waits for the next deadline.
+    pub fn wait(&mut self, clock: &mut dyn Clock) -> Wake {
+        clock.wait_until(self.next);
+        let late = (clock.now() - self.next).0.max(0.0);
+        let missed = (late / self.period.0).floor();
+        let lateness = Seconds(late - missed * self.period.0);
+        self.next = self.next + self.period * (missed + 1.0);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a count of ticks, at least 0"
+        )]
+        Wake { lateness, missed: missed as u64 }
+    }
+}
+
+/// The date and time of the wall, to the millisecond, in UTC (RFC 3339).
+#[must_use]
+pub fn timestamp() -> String {
+    jiff::Timestamp::now()
+        .round(jiff::Unit::Millisecond)
+        .map_or_else(|_| String::new(), |now| now.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deadlines_are_absolute_and_missed_ticks_are_left_out() {
+        let mut clock = VirtualClock::default();
+        let mut pacer = Pacer::new(Seconds(0.02), &clock);
+        for k in 0..100 {
+            let wake = pacer.wait(&mut clock);
+            assert_eq!(wake.missed, 0);
+            assert!((clock.now().0 - 0.02 * f64::from(k)).abs() < 1e-9);
+        }
+        clock.wait_until(clock.now() + Seconds(0.071));
+        let wake = pacer.wait(&mut clock);
+        assert_eq!(wake.missed, 2);
+        assert!((wake.lateness.0 - 0.011).abs() < 1e-9, "{wake:?}");
+        assert_eq!(pacer.wait(&mut clock).missed, 0);
+    }
+}

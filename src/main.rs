@@ -1,0 +1,3 @@
+//! The doorbell: everything else is the library.
+
+fn main() {}
