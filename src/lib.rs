@@ -2,8 +2,14 @@
 
 pub mod check;
 pub mod clock;
+pub mod control;
 pub mod learner;
 pub mod operator;
 pub mod plant;
 pub mod random;
+pub mod record;
+pub mod session;
+pub mod sharing;
 pub mod signal;
+pub mod task;
+pub mod teaching;

@@ -1,0 +1,85 @@
+//! What is kept of a session: the rows of its CSV files and its JSON files.
+
+use serde::{Deserialize, Serialize};
+
+use crate::session::Phase;
+use crate::signal::{End, State};
+
+/// A row of `steps.csv`: the state sensed before the action, the actions of the tick, and
+/// the reward, share and success used in it. What is missing is an empty cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepRow {
+    /// The phase.
+    pub phase: Phase,
+    /// The rollout within the phase, from 1.
+    pub episode: u32,
+    /// The control step within the rollout, from 0.
+    pub step: u32,
+    /// step·dt, s.
+    pub t: f64,
+    /// The state sensed before the action.
+    pub state: State,
+    /// The operator's action, plant's unit.
+    pub u_human: Option<f64>,
+    /// The learner's action.
+    pub u_machine: Option<f64>,
+    /// The person's share w.
+    pub share: Option<f64>,
+    /// The mixed action.
+    pub u: Option<f64>,
+    /// The action that the plant received.
+    pub u_applied: Option<f64>,
+    /// The reward of the state.
+    pub reward: Option<f64>,
+    /// The success after this reward.
+    pub success: Option<f64>,
+    /// The name of the state's region.
+    pub region: Option<&'static str>,
+    /// How late the tick began, µs; 0 on virtual time.
+    pub lateness_us: u32,
+}
+
+/// A row of `episodes.csv`: one rollout.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeRow {
+    /// The phase.
+    pub phase: Phase,
+    /// The rollout within the phase, from 1.
+    pub episode: u32,
+    /// The start state's telling number (release angle, rad).
+    pub start: f64,
+    /// Controlled steps.
+    pub steps: u32,
+    /// Controlled time, s.
+    pub duration_s: f64,
+    /// Why it ended.
+    pub end: End,
+    /// The sum of rewards.
+    #[serde(rename = "return")]
+    pub total: f64,
+    /// The mean of rewards.
+    pub mean_reward: f64,
+    /// The person's share at its end.
+    pub share: Option<f64>,
+    /// The success at its end.
+    pub success: Option<f64>,
+    /// The learner's receptive fields at its end.
+    pub receptive_fields: Option<u32>,
+}
+
+/// A row of `events.csv`: a transition, fault, discard or change of a device.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EventRow {
+    /// The wall's date and time; empty on virtual time.
+    pub time: String,
+    /// Where in the session, if anywhere.
+    pub phase: Option<Phase>,
+    /// The rollout.
+    pub episode: Option<u32>,
+    /// The step.
+    pub step: Option<u32>,
+    /// What happened, a word.
+    pub event: &'static str,
+    /// Why.
+    pub cause: String,
+}
