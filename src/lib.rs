@@ -1,5 +1,6 @@
 //! coadapt: the terminal laboratory for simultaneous human–robot learning.
 
+pub mod backend;
 pub mod check;
 pub mod clock;
 pub mod control;
