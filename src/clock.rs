@@ -83,30 +83,35 @@ pub struct Wake {
 /// up in a burst: a plant must not see several commands in a millisecond.
 #[derive(Clone, Copy, Debug)]
 pub struct Pacer {
-    period: Seconds,
     next: Seconds,
 }
 
 impl Pacer {
-    /// Deadlines every `period`, the first one now.
+    /// Deadlines from now on.
     #[must_use]
-    pub fn new(period: Seconds, clock: &dyn Clock) -> Self {
-        Self { period, next: clock.now() }
+    pub fn new(clock: &dyn Clock) -> Self {
+        Self { next: clock.now() }
     }
 
-    /// Waits for the next deadline.
-    pub fn wait(&mut self, clock: &mut dyn Clock) -> Wake {
+    /// Waits for the next deadline; the one after it comes `period` later.
+    pub fn wait(&mut self, clock: &mut dyn Clock, period: Seconds) -> Wake {
         clock.wait_until(self.next);
         let late = (clock.now() - self.next).0.max(0.0);
-        let missed = (late / self.period.0).floor();
-        let lateness = Seconds(late - missed * self.period.0);
-        self.next = self.next + self.period * (missed + 1.0);
+        let missed = (late / period.0).floor();
+        let lateness = Seconds(late - missed * period.0);
+        self.next = self.next + period * (missed + 1.0);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "a count of ticks, at least 0"
         )]
         Wake { lateness, missed: missed as u64 }
+    }
+
+    /// Goes on without waiting, and without anything missed.
+    pub fn skip(&mut self, clock: &dyn Clock) -> Wake {
+        self.next = clock.now();
+        Wake::default()
     }
 }
 
@@ -125,16 +130,17 @@ mod tests {
     #[test]
     fn deadlines_are_absolute_and_missed_ticks_are_left_out() {
         let mut clock = VirtualClock::default();
-        let mut pacer = Pacer::new(Seconds(0.02), &clock);
+        let period = Seconds(0.02);
+        let mut pacer = Pacer::new(&clock);
         for k in 0..100 {
-            let wake = pacer.wait(&mut clock);
+            let wake = pacer.wait(&mut clock, period);
             assert_eq!(wake.missed, 0);
             assert!((clock.now().0 - 0.02 * f64::from(k)).abs() < 1e-9);
         }
         clock.wait_until(clock.now() + Seconds(0.071));
-        let wake = pacer.wait(&mut clock);
+        let wake = pacer.wait(&mut clock, period);
         assert_eq!(wake.missed, 2);
         assert!((wake.lateness.0 - 0.011).abs() < 1e-9, "{wake:?}");
-        assert_eq!(pacer.wait(&mut clock).missed, 0);
+        assert_eq!(pacer.wait(&mut clock, period).missed, 0);
     }
 }

@@ -34,6 +34,12 @@ pub trait Task: Send + Sync {
     /// The reward of being in `state`.
     fn reward(&self, state: &State) -> f64;
 
+    /// What the success of `state`'s region is the average of; the reward unless a task
+    /// says otherwise.
+    fn measure(&self, state: &State) -> f64 {
+        self.reward(state)
+    }
+
     /// Whether a rollout that is in `state` after `steps` control steps is over.
     fn end(&self, state: &State, steps: u32) -> Option<End>;
 

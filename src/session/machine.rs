@@ -137,7 +137,10 @@ pub fn transition(plan: &Plan, stage: Stage, event: Event) -> (Stage, Vec<Effect
     match (stage, event) {
         (Stage::Finished(_), _) => (stage, vec![]),
 
-        (Stage::Running(moment) | Stage::Paused(moment), Event::Abort) if moment.step > 0 => {
+        (
+            Stage::Running(moment) | Stage::Paused(moment) | Stage::Hold { moment, .. },
+            Event::Abort,
+        ) if moment.step > 0 => {
             let (stage, mut effects) = finish(Finish::Aborted);
             effects.splice(0..0, [Halt, Close { moment, end: End::Aborted }]);
             (stage, effects)
@@ -148,7 +151,10 @@ pub fn transition(plan: &Plan, stage: Stage, event: Event) -> (Stage, Vec<Effect
             (stage, effects)
         }
 
-        (Stage::Running(moment) | Stage::Paused(moment), Event::Stop) => {
+        (
+            Stage::Running(moment) | Stage::Paused(moment) | Stage::Hold { moment, .. },
+            Event::Stop,
+        ) => {
             let effects = if moment.step > 0 {
                 vec![Halt, Close { moment, end: End::Discarded }, Restore]
             } else {
@@ -156,11 +162,6 @@ pub fn transition(plan: &Plan, stage: Stage, event: Event) -> (Stage, Vec<Effect
             };
             (Stage::Stopped(again(moment)), effects)
         }
-        (Stage::Hold { moment, .. }, Event::Stop) if moment.step > 0 => (
-            Stage::Stopped(again(moment)),
-            vec![Halt, Close { moment, end: End::Discarded }, Restore],
-        ),
-        (Stage::Hold { moment, .. }, Event::Stop) => (Stage::Stopped(moment), vec![Halt]),
         (_, Event::Stop) => (stage, vec![Halt]),
         (Stage::Stopped(moment), Event::Begin) => prepare(plan, moment, vec![]),
 
@@ -183,9 +184,10 @@ pub fn transition(plan: &Plan, stage: Stage, event: Event) -> (Stage, Vec<Effect
 
         (Stage::Running(moment), Event::Tick(end)) => step(plan, moment, end),
         (Stage::Running(moment), Event::Pause) => (Stage::Paused(moment), vec![Halt]),
-        (Stage::Running(moment) | Stage::Paused(moment), Event::Discard)
-            if moment.step > 0 && moment.phase.is_steered() =>
-        {
+        (
+            Stage::Running(moment) | Stage::Paused(moment) | Stage::Hold { moment, .. },
+            Event::Discard,
+        ) if moment.step > 0 && moment.phase.is_steered() => {
             let effects = vec![Halt, Close { moment, end: End::Discarded }, Restore];
             prepare(plan, again(moment), effects)
         }
