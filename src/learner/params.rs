@@ -1,0 +1,154 @@
+//! The learner's section of a profile.
+
+use serde::{Deserialize, Serialize};
+
+use super::kernel::Kernel;
+use super::rfwr::{InitialMetric, Rfwr, Settings};
+use super::{BuildError, Model};
+use crate::check::{Check, Checker};
+
+/// Which learner.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Receptive Field Weighted Regression, see [`rfwr`](super::rfwr).
+    #[default]
+    Rfwr,
+}
+
+/// What a profile says about the learner. Lengths are in units of the norms.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Params {
+    /// Which learner.
+    pub kind: Kind,
+    /// The most receptive fields; then none is added any more.
+    pub max_fields: u32,
+    /// The shape of the fields' edges.
+    pub kernel: Kernel,
+    /// The metric D of new fields, on the diagonal.
+    pub init_d: f64,
+    /// The learning rate of D.
+    pub init_alpha: f64,
+    /// The penalty on narrow fields.
+    pub penalty: f64,
+    /// A field is added where no activation exceeds this.
+    pub w_gen: f64,
+    /// One of two fields is removed where the activations of both exceed this.
+    pub w_prune: f64,
+    /// The forgetting factor of new fields.
+    pub init_lambda: f64,
+    /// The forgetting factor it tends to.
+    pub final_lambda: f64,
+    /// How slowly it does: λ ← τλ + final·(1 − τ).
+    pub tau_lambda: f64,
+    /// The diagonal of the inverse covariance P of new fields.
+    pub init_p: f64,
+    /// Whether fields are aligned with the axes.
+    pub diag_only: bool,
+    /// Whether D is learned at all.
+    pub update_d: bool,
+    /// Whether D's learning rates are learned too.
+    pub meta: bool,
+    /// The rate of that.
+    pub meta_rate: f64,
+    /// The smallest D: fields are at most 1/√ of this wide.
+    pub d_floor: f64,
+    /// The largest D.
+    pub d_ceiling: f64,
+    /// The least 1 − h by which the metric's memory divides.
+    pub min_one_minus_h: f64,
+    /// Each input is divided by its norm, in the input's own unit.
+    pub norm_in: Vec<f64>,
+    /// The output is divided by this, in the action's unit.
+    pub norm_out: f64,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            kind: Kind::Rfwr,
+            max_fields: 100,
+            kernel: Kernel::Gaussian,
+            init_d: 3.0,
+            init_alpha: 50.0,
+            penalty: 1e-7,
+            w_gen: 0.1,
+            w_prune: 0.9,
+            init_lambda: 0.999,
+            final_lambda: 0.9999,
+            tau_lambda: 0.99999,
+            init_p: 1e10,
+            diag_only: true,
+            update_d: true,
+            meta: false,
+            meta_rate: 250.0,
+            d_floor: 0.01,
+            d_ceiling: 1e4,
+            min_one_minus_h: 0.01,
+            // Of the cart-pole: 0.5 m, 1 m/s, 30°, 150°/s.
+            norm_in: vec![0.5, 1.0, 0.5235987755982988, 2.6179938779914944],
+            norm_out: 10.0,
+        }
+    }
+}
+
+impl Params {
+    /// A fresh learner of `inputs` numbers and one output, whose predictions stay within
+    /// ± `output_limit` (the action's unit).
+    ///
+    /// # Errors
+    /// When `norm_in` has another length than `inputs`, or a value is outside its range.
+    pub fn build(&self, inputs: usize, output_limit: f64) -> Result<Model, BuildError> {
+        let settings = Settings {
+            kernel: self.kernel,
+            diag_only: self.diag_only,
+            update_d: self.update_d,
+            meta: self.meta,
+            meta_rate: self.meta_rate,
+            penalty: self.penalty,
+            init_alpha: self.init_alpha,
+            init_d: InitialMetric::Scalar(self.init_d),
+            norm_in: self.norm_in.clone(),
+            norm_out: vec![self.norm_out],
+            w_gen: self.w_gen,
+            w_prune: self.w_prune,
+            init_lambda: self.init_lambda,
+            final_lambda: self.final_lambda,
+            tau_lambda: self.tau_lambda,
+            init_p: self.init_p,
+            max_fields: Some(self.max_fields),
+            output_limit: Some(output_limit),
+            d_floor: Some(self.d_floor),
+            d_ceiling: Some(self.d_ceiling),
+            min_one_minus_h: Some(self.min_one_minus_h),
+            ..Settings::new(inputs, 1)
+        };
+        match self.kind {
+            Kind::Rfwr => Ok(Model::Rfwr(Rfwr::new(settings)?)),
+        }
+    }
+}
+
+impl Check for Params {
+    fn check(&self, c: &mut Checker<'_>) {
+        c.count("max_fields", self.max_fields, 1..=10_000);
+        c.range("init_d", self.init_d, 1e-6..=1e6);
+        c.range("init_alpha", self.init_alpha, 0.0..=1e6);
+        c.range("penalty", self.penalty, 0.0..=1.0);
+        c.range("w_gen", self.w_gen, 0.001..=0.99);
+        c.range("w_prune", self.w_prune, self.w_gen..=1.0);
+        c.range("init_lambda", self.init_lambda, 0.5..=1.0);
+        c.range("final_lambda", self.final_lambda, 0.5..=1.0);
+        c.range("tau_lambda", self.tau_lambda, 0.0..=1.0);
+        c.range("init_p", self.init_p, 1e-6..=1e15);
+        c.range("meta_rate", self.meta_rate, 0.0..=1e6);
+        c.range("d_floor", self.d_floor, 1e-12..=1e6);
+        c.range("d_ceiling", self.d_ceiling, self.d_floor..=1e12);
+        c.range("min_one_minus_h", self.min_one_minus_h, 1e-12..=1.0);
+        for (index, norm) in self.norm_in.iter().enumerate() {
+            c.range(&format!("norm_in[{index}]"), *norm, 1e-9..=1e9);
+        }
+        c.range("norm_out", self.norm_out, 1e-9..=1e9);
+    }
+}

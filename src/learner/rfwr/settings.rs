@@ -1,0 +1,235 @@
+//! What Receptive Field Weighted Regression is told beforehand.
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use crate::learner::BuildError;
+use crate::learner::kernel::Kernel;
+use crate::learner::shapes::is_positive;
+
+/// The most inputs a learner takes.
+pub const MAX_INPUTS: usize = 64;
+
+/// The metric that new fields start with, in normalised coordinates.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InitialMetric {
+    /// The same width in all directions: D = d I.
+    Scalar(f64),
+    /// A width per direction.
+    Diagonal(Vec<f64>),
+    /// The whole symmetric matrix, by rows; not with `diag_only`, which would ignore what is
+    /// off the diagonal.
+    Full(Vec<Vec<f64>>),
+}
+
+/// All settings of the algorithm, named as in the literature. [`Settings::new`] gives the
+/// published values; what is marked "ours" is off there.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// n, the number of inputs.
+    pub inputs: usize,
+    /// m, the number of outputs.
+    pub outputs: usize,
+    /// The shape of the fields' edges; the bi-square kernel ends at q = 2.
+    pub kernel: Kernel,
+    /// Whether fields are aligned with the axes (diagonal D).
+    pub diag_only: bool,
+    /// Whether D is learned at all.
+    pub update_d: bool,
+    /// Whether D's learning rates are learned too.
+    pub meta: bool,
+    /// The rate of that.
+    pub meta_rate: f64,
+    /// The penalty on narrow fields: the smaller, the narrower fields may become.
+    pub penalty: f64,
+    /// The learning rate α of D.
+    pub init_alpha: f64,
+    /// D of new fields.
+    pub init_d: InitialMetric,
+    /// Each input is divided by its norm (n).
+    pub norm_in: Vec<f64>,
+    /// Each output is divided by its norm (m).
+    pub norm_out: Vec<f64>,
+    /// A field is added where no activation exceeds this.
+    pub w_gen: f64,
+    /// One of two fields is removed where the activations of both exceed this.
+    pub w_prune: f64,
+    /// The forgetting factor λ of new fields,
+    pub init_lambda: f64,
+    /// the one it tends to,
+    pub final_lambda: f64,
+    /// and how slowly: λ ← τλ + final·(1 − τ).
+    pub tau_lambda: f64,
+    /// The diagonal of P of new fields.
+    pub init_p: f64,
+    /// A field may speak when all its variance inflation factors are below this.
+    pub vif_trust: f64,
+    /// D is not learned while all variance inflation factors are above this.
+    pub vif_update: f64,
+    /// A field may speak when it has seen more than this times n samples.
+    pub min_n_data_factor: f64,
+    /// Fields with an activation up to this neither learn nor speak.
+    pub cutoff: f64,
+    /// Ours: with this many fields no further one is added; a sample in empty space is then
+    /// learned by the fields it activates at all, and by none if there are none.
+    #[serde(default)]
+    pub max_fields: Option<u32>,
+    /// Ours: predictions are clamped to ± this, in the outputs' raw units.
+    #[serde(default)]
+    pub output_limit: Option<f64>,
+    /// Ours: M's diagonal is kept at or above √ of this. Without it a direction that does
+    /// not matter may collapse beyond return, since steps on M are proportional to M.
+    #[serde(default)]
+    pub d_floor: Option<f64>,
+    /// Ours: M's diagonal is kept at or below √ of this, and what is off it within ±.
+    #[serde(default)]
+    pub d_ceiling: Option<f64>,
+    /// Ours: 1 − h, by which the metric's memory divides, is at least this.
+    #[serde(default)]
+    pub min_one_minus_h: Option<f64>,
+}
+
+impl Settings {
+    /// The published settings for `inputs` and `outputs`, without scaling.
+    #[must_use]
+    pub fn new(inputs: usize, outputs: usize) -> Self {
+        Self {
+            inputs,
+            outputs,
+            kernel: Kernel::Gaussian,
+            diag_only: true,
+            update_d: true,
+            meta: false,
+            meta_rate: 250.0,
+            penalty: 1e-7,
+            init_alpha: 250.0,
+            init_d: InitialMetric::Scalar(25.0),
+            norm_in: vec![1.0; inputs],
+            norm_out: vec![1.0; outputs],
+            w_gen: 0.1,
+            w_prune: 0.9,
+            init_lambda: 0.999,
+            final_lambda: 0.9999,
+            tau_lambda: 0.99999,
+            init_p: 1e10,
+            vif_trust: 10.0,
+            vif_update: 5.0,
+            min_n_data_factor: 2.0,
+            cutoff: 0.001,
+            max_fields: None,
+            output_limit: None,
+            d_floor: None,
+            d_ceiling: None,
+            min_one_minus_h: None,
+        }
+    }
+
+    /// γ, the penalty per input.
+    pub(super) fn gamma(&self) -> f64 {
+        #[expect(clippy::cast_precision_loss, reason = "at most 64 inputs")]
+        let inputs = self.inputs as f64;
+        self.penalty / inputs
+    }
+
+    /// The bounds of M's diagonal, if any are set.
+    pub(super) fn bounds(&self) -> Option<(f64, f64)> {
+        if self.d_floor.is_none() && self.d_ceiling.is_none() {
+            return None;
+        }
+        let floor = self.d_floor.map_or(0.0, f64::sqrt);
+        Some((floor, self.d_ceiling.map_or(f64::INFINITY, f64::sqrt)))
+    }
+
+    /// D and M of new fields, as the diagonal (`diag_only`) or by rows.
+    ///
+    /// # Errors
+    /// When a number of the settings is outside its range, a length does not fit, or
+    /// `init_d` is no metric.
+    pub(super) fn start(&self) -> Result<(Vec<f64>, Vec<f64>), BuildError> {
+        self.check_lengths()?;
+        self.check_ranges()?;
+        let n = self.inputs;
+        let matrix = match &self.init_d {
+            InitialMetric::Scalar(d) => DMatrix::from_diagonal_element(n, n, *d),
+            InitialMetric::Diagonal(d) => {
+                length("init_d", d.len(), n)?;
+                DMatrix::from_diagonal(&d.clone().into())
+            }
+            InitialMetric::Full(_) if self.diag_only => {
+                return Err(BuildError::FullMetric);
+            }
+            InitialMetric::Full(rows) => {
+                length("init_d", rows.len(), n)?;
+                rows.iter().try_for_each(|row| length("init_d", row.len(), n))?;
+                DMatrix::from_fn(n, n, |a, b| rows[a][b])
+            }
+        };
+        if matrix != matrix.transpose() {
+            return Err(BuildError::NoMetric);
+        }
+        let lower = matrix.clone().cholesky().ok_or(BuildError::NoMetric)?.unpack();
+        // nalgebra stores by columns: Mᵀ by columns is M by rows.
+        let (d, m) = if self.diag_only {
+            (matrix.diagonal().as_slice().to_vec(), lower.diagonal().as_slice().to_vec())
+        } else {
+            (matrix.as_slice().to_vec(), lower.as_slice().to_vec())
+        };
+        let sound = d.iter().chain(&m).all(|value| value.is_finite());
+        if sound && is_positive(&d, n) { Ok((d, m)) } else { Err(BuildError::NoMetric) }
+    }
+
+    fn check_lengths(&self) -> Result<(), BuildError> {
+        let sizes = [("inputs", self.inputs), ("outputs", self.outputs)];
+        for (key, given) in sizes {
+            if !(1..=MAX_INPUTS).contains(&given) {
+                return Err(BuildError::Size { key, given });
+            }
+        }
+        length("norm_in", self.norm_in.len(), self.inputs)?;
+        length("norm_out", self.norm_out.len(), self.outputs)
+    }
+
+    fn check_ranges(&self) -> Result<(), BuildError> {
+        const SMALL: f64 = 1e-12;
+        const BIG: f64 = 1e12;
+        let optional = [
+            ("output_limit", self.output_limit, 0.0, f64::MAX),
+            ("d_floor", self.d_floor, SMALL, BIG),
+            ("d_ceiling", self.d_ceiling, self.d_floor.unwrap_or(SMALL), BIG),
+            ("min_one_minus_h", self.min_one_minus_h, SMALL, 1.0),
+        ];
+        let optional =
+            optional.into_iter().filter_map(|(key, value, from, to)| Some((key, value?, from, to)));
+        let always = [
+            ("meta_rate", self.meta_rate, 0.0, BIG),
+            ("penalty", self.penalty, 0.0, BIG),
+            ("init_alpha", self.init_alpha, 0.0, BIG),
+            ("w_gen", self.w_gen, 0.0, 1.0),
+            ("w_prune", self.w_prune, 0.0, 1.0),
+            ("init_lambda", self.init_lambda, 0.5, 1.0),
+            ("final_lambda", self.final_lambda, 0.5, 1.0),
+            ("tau_lambda", self.tau_lambda, 0.0, 1.0),
+            ("init_p", self.init_p, SMALL, 1e100),
+            ("vif_trust", self.vif_trust, 0.0, BIG),
+            ("vif_update", self.vif_update, 0.0, BIG),
+            ("min_n_data_factor", self.min_n_data_factor, 0.0, BIG),
+            ("cutoff", self.cutoff, SMALL, 0.5),
+        ];
+        let norms_in = self.norm_in.iter().map(|&norm| ("norm_in", norm, SMALL, BIG));
+        let norms_out = self.norm_out.iter().map(|&norm| ("norm_out", norm, SMALL, BIG));
+        for (key, value, from, to) in
+            always.into_iter().chain(optional).chain(norms_in).chain(norms_out)
+        {
+            if !(from..=to).contains(&value) {
+                return Err(BuildError::Range { key, value, from, to });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn length(key: &'static str, given: usize, wanted: usize) -> Result<(), BuildError> {
+    if given == wanted { Ok(()) } else { Err(BuildError::Length { key, given, wanted }) }
+}

@@ -1,0 +1,200 @@
+//! Where the receptive fields are and how far they reach.
+//!
+//! Centres and metrics of all fields lie side by side, so that the search for the active
+//! ones, the hot loop of every prediction, walks straight through memory.
+
+use serde::{Deserialize, Serialize};
+
+/// Centres c and distance metrics D of all fields, in normalised coordinates.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shapes {
+    inputs: usize,
+    diagonal: bool,
+    /// n numbers a field.
+    centres: Vec<f64>,
+    /// n numbers a field (the diagonal) or n × n.
+    metrics: Vec<f64>,
+}
+
+/// The two fields nearest in their own metrics; of equally near ones the earlier is ahead.
+#[derive(Clone, Copy, Debug)]
+pub struct Nearest {
+    /// Field and q of the nearest.
+    pub first: Option<(usize, f64)>,
+    /// Field and q of the next.
+    pub second: Option<(usize, f64)>,
+}
+
+impl Nearest {
+    /// Nobody yet.
+    pub const NONE: Self = Self { first: None, second: None };
+
+    /// Takes note of `field` at `q`; a NaN distance is no distance.
+    pub fn note(&mut self, field: usize, q: f64) {
+        let ahead_of = |rival: Option<(usize, f64)>| match rival {
+            Some((_, other)) => q < other,
+            None => !q.is_nan(),
+        };
+        if ahead_of(self.first) {
+            self.second = self.first;
+            self.first = Some((field, q));
+        } else if ahead_of(self.second) {
+            self.second = Some((field, q));
+        }
+    }
+}
+
+impl Shapes {
+    /// No fields yet, over `inputs` dimensions.
+    pub fn new(inputs: usize, diagonal: bool) -> Self {
+        Self { inputs, diagonal, centres: Vec::new(), metrics: Vec::new() }
+    }
+
+    /// The numbers a metric takes: n when diagonal, n × n otherwise.
+    pub fn entries(&self) -> usize {
+        if self.diagonal { self.inputs } else { self.inputs * self.inputs }
+    }
+
+    /// Whether this holds `fields` fields of `inputs` dimensions, all of them usable.
+    pub fn holds(&self, inputs: usize, diagonal: bool, fields: usize) -> bool {
+        self.inputs == inputs
+            && self.diagonal == diagonal
+            && Some(self.centres.len()) == fields.checked_mul(inputs)
+            && Some(self.metrics.len()) == fields.checked_mul(self.entries())
+            && self.centres.iter().chain(&self.metrics).all(|value| value.is_finite())
+            && (0..fields).all(|field| is_positive(self.metric(field), inputs))
+    }
+
+    /// The centre of `field`.
+    pub fn centre(&self, field: usize) -> &[f64] {
+        &self.centres[field * self.inputs..][..self.inputs]
+    }
+
+    /// The metric D of `field`.
+    pub fn metric(&self, field: usize) -> &[f64] {
+        &self.metrics[field * self.entries()..][..self.entries()]
+    }
+
+    /// Gives `field` the metric D.
+    pub fn set_metric(&mut self, field: usize, d: &[f64]) {
+        let entries = self.entries();
+        self.metrics[field * entries..][..entries].copy_from_slice(d);
+    }
+
+    /// Appends a field.
+    pub fn push(&mut self, centre: &[f64], d: &[f64]) {
+        self.centres.extend_from_slice(centre);
+        self.metrics.extend_from_slice(d);
+    }
+
+    /// Removes `field`; the later ones move down.
+    pub fn remove(&mut self, field: usize) {
+        let (n, entries) = (self.inputs, self.entries());
+        self.centres.drain(field * n..(field + 1) * n);
+        self.metrics.drain(field * entries..(field + 1) * entries);
+    }
+
+    /// The squared distance q of `x` from `field`, in the field's metric.
+    pub fn distance(&self, field: usize, x: &[f64]) -> f64 {
+        let (centre, metric) = (self.centre(field), self.metric(field));
+        if self.diagonal {
+            diagonal_distance(centre, metric, x)
+        } else {
+            full_distance(centre, metric, x)
+        }
+    }
+
+    /// Hands every field's squared distance from `x` to `visit`, in storage order.
+    pub fn distances(&self, x: &[f64], visit: impl FnMut(usize, f64)) {
+        // The common sizes get loops that the compiler can unroll.
+        match self.inputs {
+            2 => self.distances_of(&x[..2], 2, visit),
+            4 => self.distances_of(&x[..4], 4, visit),
+            n => self.distances_of(x, n, visit),
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "specialises the scan to a constant `n`")]
+    fn distances_of(&self, x: &[f64], n: usize, mut visit: impl FnMut(usize, f64)) {
+        let centres = self.centres.chunks_exact(n);
+        if self.diagonal {
+            for (field, (c, d)) in centres.zip(self.metrics.chunks_exact(n)).enumerate() {
+                visit(field, diagonal_distance(c, d, &x[..n]));
+            }
+        } else {
+            for (field, (c, d)) in centres.zip(self.metrics.chunks_exact(n * n)).enumerate() {
+                visit(field, full_distance(c, d, &x[..n]));
+            }
+        }
+    }
+}
+
+/// Whether every number on the diagonal of the metric `d` is a normal positive one.
+pub fn is_positive(d: &[f64], inputs: usize) -> bool {
+    let stride = if d.len() == inputs { 1 } else { inputs + 1 };
+    d.iter().step_by(stride).all(|&value| value >= f64::MIN_POSITIVE)
+}
+
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "specialises the scan to a constant length")]
+fn diagonal_distance(centre: &[f64], metric: &[f64], x: &[f64]) -> f64 {
+    let mut q = 0.0;
+    for ((c, d), x) in centre.iter().zip(metric).zip(x) {
+        let offset = x - c;
+        q += offset * offset * d;
+    }
+    q
+}
+
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "specialises the scan to a constant length")]
+fn full_distance(centre: &[f64], metric: &[f64], x: &[f64]) -> f64 {
+    let mut q = 0.0;
+    for ((c, row), x_a) in centre.iter().zip(metric.chunks_exact(x.len())).zip(x) {
+        let mut along = 0.0;
+        for ((c_b, d), x_b) in centre.iter().zip(row).zip(x) {
+            along += (x_b - c_b) * d;
+        }
+        q += along * (x_a - c);
+    }
+    q
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nearest_keeps_the_two_nearest_and_the_earlier_of_equals() {
+        let mut nearest = Nearest::NONE;
+        for (field, q) in [(0, 5.0), (1, f64::NAN), (2, 3.0), (3, 3.0), (4, 9.0)] {
+            nearest.note(field, q);
+        }
+        assert_eq!(nearest.first, Some((2, 3.0)));
+        assert_eq!(nearest.second, Some((3, 3.0)));
+    }
+
+    #[test]
+    fn removal_moves_the_later_fields_down() {
+        let mut shapes = Shapes::new(2, true);
+        for field in 0..3 {
+            let at = f64::from(field);
+            shapes.push(&[at, -at], &[at + 1.0, at + 2.0]);
+        }
+        shapes.remove(1);
+        assert!(shapes.holds(2, true, 2));
+        assert_eq!(shapes.centre(1), [2.0, -2.0]);
+        assert_eq!(shapes.metric(1), [3.0, 4.0]);
+    }
+
+    #[test]
+    fn diagonal_and_full_metrics_measure_alike() {
+        let (mut diagonal, mut full) = (Shapes::new(2, true), Shapes::new(2, false));
+        diagonal.push(&[1.0, -1.0], &[2.0, 3.0]);
+        full.push(&[1.0, -1.0], &[2.0, 0.0, 0.0, 3.0]);
+        assert_eq!(diagonal.distance(0, &[2.0, 1.0]), 14.0);
+        assert_eq!(full.distance(0, &[2.0, 1.0]), 14.0);
+    }
+}
