@@ -1,5 +1,9 @@
 //! Who steers: hands on a device, a script, a simulated operator, or nobody.
 
+pub mod shaping;
+pub mod simulated;
+pub mod terminal;
+
 use crate::random::Place;
 use crate::signal::{Action, End, Intent, Seconds, State};
 
