@@ -15,7 +15,7 @@ impl Shaping {
     /// The action for a deflection in [-1, 1]; what is not a number counts as rest.
     #[must_use]
     pub fn shape(&self, raw: f64) -> f64 {
-        let beyond = (raw.abs().min(1.0) - self.dead_zone) / (1.0 - self.dead_zone);
+        let beyond = (raw.clamp(-1.0, 1.0).abs() - self.dead_zone) / (1.0 - self.dead_zone);
         if beyond > 0.0 {
             (self.sensitivity * beyond.copysign(raw)).clamp(-1.0, 1.0) * self.limit
         } else {

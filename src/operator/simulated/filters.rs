@@ -31,6 +31,7 @@ impl<const N: usize> DelayLine<N> {
 
     /// Forgets everything: the next row is taken for the whole past.
     pub(super) fn clear(&mut self) {
+        self.rows.fill([0.0; N]);
         self.empty = true;
     }
 

@@ -212,13 +212,9 @@ impl Hold {
     }
 
     fn repeat_hold(&self) -> f64 {
-        let learned = |interval: f64| {
-            (REPEAT_MARGIN * interval).clamp(LEARNED_HOLD_S.0, LEARNED_HOLD_S.1)
-        };
-        self.timing
-            .repeat_hold_s
-            .or(self.interval.map(learned))
-            .unwrap_or(self.timing.tap_hold_s)
+        let learned =
+            |interval: f64| (REPEAT_MARGIN * interval).clamp(LEARNED_HOLD_S.0, LEARNED_HOLD_S.1);
+        self.timing.repeat_hold_s.or(self.interval.map(learned)).unwrap_or(self.timing.tap_hold_s)
     }
 
     /// Pushes to `to` from now, or on if it does already; never ends a push earlier.
