@@ -1,5 +1,13 @@
 //! Who steers: hands on a device, a script, a simulated operator, or nobody.
 
+mod choice;
+pub mod script;
+pub mod shaping;
+pub mod simulated;
+pub mod terminal;
+
+pub use choice::{Choice, Params, UnknownOperator};
+
 use crate::random::Place;
 use crate::signal::{Action, End, Intent, Seconds, State};
 

@@ -1,0 +1,223 @@
+//! The numbers of the simulated operators.
+
+use serde::{Deserialize, Serialize};
+
+use super::Skill;
+use crate::check::{Check, Checker};
+
+/// A value at skill 0 and at skill 1; between and beyond, the line through both.
+pub type BySkill = (f64, f64);
+
+/// How an operator's skill grows, and how much operators differ.
+///
+/// Skill 0 is a first try, 1 a practised hand; above 1 the values are extrapolated.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Practice {
+    /// Skill before the first rollout.
+    pub skill_first: f64,
+    /// Skill after endless practice.
+    pub skill_last: f64,
+    /// Standard deviation of `skill_last` over operators.
+    pub skill_last_sd: f64,
+    /// Factor on the spread of all personal traits.
+    pub trait_spread: f64,
+}
+
+/// The simulated operators' parameters: a person at a cart-pole.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Params {
+    /// Skill of `simulated:naive`.
+    pub naive: Practice,
+    /// Skill of `simulated:average`.
+    pub average: Practice,
+    /// Skill of `simulated:expert`.
+    pub expert: Practice,
+    /// Rollouts in which the distance to the last skill shrinks to 1/e.
+    pub practice_rollouts: f64,
+    /// How old the state is that the operator acts on, s.
+    pub delay_s: BySkill,
+    /// Standard deviation of the delay over operators, s.
+    pub delay_sd_s: f64,
+    /// Standard deviation of the error in the angle seen, degrees.
+    pub theta_noise_deg: BySkill,
+    /// Standard deviation of the error in the angular velocity seen, degrees/s.
+    pub theta_dot_noise_deg_s: BySkill,
+    /// Correlation time of both errors and of `motor_noise_n`, s.
+    pub noise_correlation_s: f64,
+    /// Angles up to this one look upright, degrees.
+    pub dead_zone_deg: BySkill,
+    /// Force per angle, N/rad.
+    pub theta_gain_n_rad: BySkill,
+    /// Force per angular velocity, N·s/rad.
+    pub theta_dot_gain_n_s_rad: BySkill,
+    /// Force per distance from the track's middle, N/m.
+    pub x_gain_n_m: BySkill,
+    /// Force per velocity of the cart, N·s/m.
+    pub x_dot_gain_n_s_m: BySkill,
+    /// Standard deviation of the logarithm of the personal factor on each gain, noise and
+    /// dead zone.
+    pub trait_sd: f64,
+    /// The same for the factor on `theta_gain_n_rad`.
+    pub theta_gain_trait_sd: f64,
+    /// Time constant of the hand, s.
+    pub lag_s: f64,
+    /// White motor noise before the lag, as a fraction of the wanted force.
+    pub motor_noise_fraction: BySkill,
+    /// Wandering motor noise, N.
+    pub motor_noise_n: BySkill,
+    /// `intermittent`: a decision is held for a time drawn between these, s.
+    pub decision_hold_s: (f64, f64),
+    /// `bang-bang`: the force of a push, N.
+    pub bang_force_n: f64,
+    /// `bang-bang`: wanted forces up to this one are no push, N.
+    pub bang_threshold_n: f64,
+    /// `predictor`: the pole's length in the operator's head, as a factor on the true one.
+    pub model_length_factor: f64,
+    /// `predictor`: factor on what it misperceives of the angle and its velocity.
+    pub model_noise_factor: BySkill,
+    /// `mouse-limited`: time constant with which a sustained force fades, s.
+    pub travel_s: f64,
+    /// `lapses`: how often a push goes the wrong way, 1/s.
+    pub lapses_per_s: BySkill,
+    /// `lapses`: how long it does, s.
+    pub lapse_s: f64,
+}
+
+impl Params {
+    /// The practice of operators with `skill`.
+    #[must_use]
+    pub const fn practice(&self, skill: Skill) -> &Practice {
+        match skill {
+            Skill::Naive => &self.naive,
+            Skill::Average => &self.average,
+            Skill::Expert => &self.expert,
+        }
+    }
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            naive: Practice {
+                skill_first: 0.05,
+                skill_last: 0.7,
+                skill_last_sd: 0.1,
+                trait_spread: 1.0,
+            },
+            average: Practice {
+                skill_first: 0.4,
+                skill_last: 0.9,
+                skill_last_sd: 0.1,
+                trait_spread: 1.0,
+            },
+            expert: Practice {
+                skill_first: 1.2,
+                skill_last: 1.2,
+                skill_last_sd: 0.0,
+                trait_spread: 0.5,
+            },
+            practice_rollouts: 40.0,
+            delay_s: (0.22, 0.18),
+            delay_sd_s: 0.015,
+            theta_noise_deg: (0.6, 0.4),
+            theta_dot_noise_deg_s: (8.0, 5.0),
+            noise_correlation_s: 0.15,
+            dead_zone_deg: (2.0, 1.0),
+            theta_gain_n_rad: (14.0, 11.5),
+            theta_dot_gain_n_s_rad: (2.5, 6.0),
+            x_gain_n_m: (0.0, 1.6),
+            x_dot_gain_n_s_m: (0.0, 0.5),
+            trait_sd: 0.2,
+            theta_gain_trait_sd: 0.1,
+            lag_s: 0.1,
+            motor_noise_fraction: (0.5, 0.25),
+            motor_noise_n: (1.0, 0.5),
+            decision_hold_s: (0.2, 0.3),
+            bang_force_n: 3.0,
+            bang_threshold_n: 0.6,
+            model_length_factor: 1.5,
+            model_noise_factor: (3.0, 2.0),
+            travel_s: 1.0,
+            lapses_per_s: (1.0, 0.5),
+            lapse_s: 0.2,
+        }
+    }
+}
+
+impl Check for Practice {
+    fn check(&self, c: &mut Checker<'_>) {
+        c.range("skill_first", self.skill_first, 0.0..=2.0);
+        c.range("skill_last", self.skill_last, 0.0..=2.0);
+        c.range("skill_last_sd", self.skill_last_sd, 0.0..=0.5);
+        c.range("trait_spread", self.trait_spread, 0.0..=5.0);
+    }
+}
+
+impl Check for Params {
+    fn check(&self, c: &mut Checker<'_>) {
+        self.naive.check(&mut c.section("naive"));
+        self.average.check(&mut c.section("average"));
+        self.expert.check(&mut c.section("expert"));
+        c.range("practice_rollouts", self.practice_rollouts, 0.1..=10_000.0);
+        c.range("delay_sd_s", self.delay_sd_s, 0.0..=0.2);
+        c.range("noise_correlation_s", self.noise_correlation_s, 0.0..=10.0);
+        c.range("trait_sd", self.trait_sd, 0.0..=1.0);
+        c.range("theta_gain_trait_sd", self.theta_gain_trait_sd, 0.0..=1.0);
+        c.range("lag_s", self.lag_s, 0.0..=2.0);
+        c.range("bang_force_n", self.bang_force_n, 0.0..=1000.0);
+        c.range("bang_threshold_n", self.bang_threshold_n, 0.0..=1000.0);
+        c.range("model_length_factor", self.model_length_factor, 0.1..=10.0);
+        c.range("travel_s", self.travel_s, 0.01..=100.0);
+        c.range("lapse_s", self.lapse_s, 0.0..=10.0);
+        let pairs = [
+            ("delay_s", self.delay_s, 0.0..=1.0),
+            ("theta_noise_deg", self.theta_noise_deg, 0.0..=45.0),
+            ("theta_dot_noise_deg_s", self.theta_dot_noise_deg_s, 0.0..=360.0),
+            ("dead_zone_deg", self.dead_zone_deg, 0.0..=45.0),
+            ("theta_gain_n_rad", self.theta_gain_n_rad, -1000.0..=1000.0),
+            ("theta_dot_gain_n_s_rad", self.theta_dot_gain_n_s_rad, -1000.0..=1000.0),
+            ("x_gain_n_m", self.x_gain_n_m, -1000.0..=1000.0),
+            ("x_dot_gain_n_s_m", self.x_dot_gain_n_s_m, -1000.0..=1000.0),
+            ("motor_noise_fraction", self.motor_noise_fraction, 0.0..=5.0),
+            ("motor_noise_n", self.motor_noise_n, 0.0..=1000.0),
+            ("decision_hold_s", self.decision_hold_s, 0.0..=10.0),
+            ("model_noise_factor", self.model_noise_factor, 0.0..=100.0),
+            ("lapses_per_s", self.lapses_per_s, 0.0..=100.0),
+        ];
+        for (key, (first, second), range) in pairs {
+            c.range(&format!("{key}.0"), first, range.clone());
+            c.range(&format!("{key}.1"), second, range);
+        }
+        c.demand(
+            self.decision_hold_s.0 <= self.decision_hold_s.1,
+            "decision_hold_s",
+            format!("({}, {})", self.decision_hold_s.0, self.decision_hold_s.1),
+            "the shorter time first",
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_pass_and_every_fault_is_named() {
+        let mut faults = Vec::new();
+        Params::default().check(&mut Checker::new(&mut faults));
+        assert_eq!(faults, []);
+        let mut wrong = Params { lag_s: f64::NAN, delay_s: (0.2, -1.0), ..Params::default() };
+        wrong.naive.skill_first = 9.0;
+        wrong.check(&mut Checker::new(&mut faults));
+        let keys: Vec<&str> = faults.iter().map(|fault| &fault.key[..]).collect();
+        assert_eq!(keys, ["naive.skill_first", "lag_s", "delay_s.1"]);
+    }
+
+    #[test]
+    fn the_parameters_survive_ron() {
+        let text = ron::to_string(&Params::default()).unwrap();
+        assert_eq!(ron::from_str::<Params>(&text).unwrap(), Params::default());
+    }
+}

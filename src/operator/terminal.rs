@@ -1,0 +1,204 @@
+//! Hands on the keyboard.
+//!
+//! The terminal has one reader, the screen's; it feeds the keys to [`Hands`], and the
+//! [`Keyboard`] samples them at each tick. Both must use the same clock.
+
+mod hold;
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use serde::{Deserialize, Serialize};
+
+pub use hold::{Direction, Hold, KeyReleases, Timing};
+
+use super::shaping::Shaping;
+use super::{Operator, View};
+use crate::check::{Check, Checker};
+use crate::clock::{Clock, WallClock};
+use crate::random::Place;
+use crate::signal::{Action, Intent, Seconds};
+
+/// The keyboard's parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Params {
+    /// A held key's push, as a fraction of the force limit.
+    pub push: f64,
+    /// The time in which a push grows to its full strength, s; 0: at once.
+    pub rise_s: f64,
+    /// How long a single press pushes where the terminal reports no releases, s.
+    pub tap_hold_s: f64,
+    /// How long a key repeat pushes there, s; `None`: 1.6 times the measured interval.
+    pub repeat_hold_s: Option<f64>,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self { push: 0.5, rise_s: 0.06, tap_hold_s: 0.12, repeat_hold_s: None }
+    }
+}
+
+impl Check for Params {
+    fn check(&self, c: &mut Checker<'_>) {
+        c.range("push", self.push, 0.01..=1.0);
+        c.range("rise_s", self.rise_s, 0.0..=2.0);
+        c.range("tap_hold_s", self.tap_hold_s, 0.02..=1.0);
+        if let Some(hold) = self.repeat_hold_s {
+            c.range("repeat_hold_s", hold, 0.02..=1.0);
+        }
+    }
+}
+
+/// The steering keys' state, shared by the reader that feeds it and the [`Keyboard`].
+#[derive(Clone, Debug)]
+pub struct Hands {
+    hold: Arc<Mutex<Hold>>,
+}
+
+impl Hands {
+    /// Hands that touch no key.
+    #[must_use]
+    pub fn new(params: &Params) -> Self {
+        let timing = Timing {
+            tap_hold_s: params.tap_hold_s,
+            repeat_hold_s: params.repeat_hold_s,
+            rise_s: params.rise_s,
+        };
+        Self { hold: Arc::new(Mutex::new(Hold::new(timing))) }
+    }
+
+    /// Takes a key event if it steers, and says whether it did.
+    pub fn feed(&self, key: &KeyEvent, now: Seconds) -> bool {
+        let Some(direction) = direction(key) else { return false };
+        match key.kind {
+            KeyEventKind::Press => self.press(direction, now),
+            KeyEventKind::Repeat => self.repeat(direction, now),
+            KeyEventKind::Release => self.release(direction, now),
+        }
+        true
+    }
+
+    /// A key went down at `now`.
+    pub fn press(&self, direction: Direction, now: Seconds) {
+        self.hold().press(direction, now);
+    }
+
+    /// A key is still down at `now`.
+    pub fn repeat(&self, direction: Direction, now: Seconds) {
+        self.hold().repeat(direction, now);
+    }
+
+    /// A key went up at `now`.
+    pub fn release(&self, direction: Direction, now: Seconds) {
+        self.hold().release(direction, now);
+    }
+
+    /// Lets all keys go: the focus is lost, or the session pauses.
+    pub fn release_all(&self) {
+        self.hold().release_all();
+    }
+
+    /// Says whether the terminal reports releases.
+    pub fn set_releases_known(&self, known: bool) {
+        self.hold().set_knowledge(if known {
+            KeyReleases::Reported
+        } else {
+            KeyReleases::Estimated
+        });
+    }
+
+    /// How releases are known.
+    #[must_use]
+    pub fn knowledge(&self) -> KeyReleases {
+        self.hold().knowledge()
+    }
+
+    /// The time of the last steering key's event, if there was one.
+    #[must_use]
+    pub fn last_event(&self) -> Option<Seconds> {
+        self.hold().last_event()
+    }
+
+    /// The keys' state stays whole even if a thread died holding it.
+    fn hold(&self) -> MutexGuard<'_, Hold> {
+        self.hold.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The direction of a steering key: arrows, h/l, a/d; stop is down or s.
+#[must_use]
+pub fn direction(key: &KeyEvent) -> Option<Direction> {
+    // A release counts whatever else is held by then, or the key would stay down.
+    let shortcut = key.modifiers.difference(KeyModifiers::SHIFT) != KeyModifiers::NONE;
+    if shortcut && key.kind != KeyEventKind::Release {
+        return None;
+    }
+    match key.code {
+        KeyCode::Left | KeyCode::Char('h' | 'H' | 'a' | 'A') => Some(Direction::Left),
+        KeyCode::Right | KeyCode::Char('l' | 'L' | 'd' | 'D') => Some(Direction::Right),
+        KeyCode::Down | KeyCode::Char('s' | 'S') => Some(Direction::Stop),
+        _ => None,
+    }
+}
+
+/// The operator at the keyboard: the push of [`Hands`], sampled at each tick.
+#[derive(Clone, Debug)]
+pub struct Keyboard {
+    hands: Hands,
+    clock: WallClock,
+    push: f64,
+    shaping: Shaping,
+}
+
+impl Keyboard {
+    /// The keyboard under `hands`, whose events carry times of `clock`.
+    #[must_use]
+    pub fn new(hands: Hands, clock: WallClock, params: &Params, shaping: Shaping) -> Self {
+        Self { hands, clock, push: params.push, shaping }
+    }
+}
+
+impl Operator for Keyboard {
+    /// A key that is held through the countdown goes on pushing.
+    fn begin(&mut self, _place: Place, _practice: u32) {}
+
+    fn intent(&mut self, _view: View<'_>) -> Intent {
+        let now = self.clock.now();
+        let hold = self.hands.hold();
+        let age = hold.last_event().map_or(0.0, |at| (now - at).0.max(0.0));
+        let action = self.shaping.shape(self.push * hold.push(now));
+        Intent::Present { action: Action(action), age: Seconds(age) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::State;
+
+    #[test]
+    fn a_held_arrow_pushes_half_the_limit() {
+        let params = Params { rise_s: 0.0, ..Params::default() };
+        let hands = Hands::new(&params);
+        let clock = WallClock::start();
+        let shaping = Shaping { dead_zone: 0.0, sensitivity: 1.0, limit: 10.0 };
+        let mut keyboard = Keyboard::new(hands.clone(), clock, &params, shaping);
+        let state = State::default();
+        let view = View { state: &state, now: Seconds(0.0), rollout_time: Seconds(0.0) };
+        hands.set_releases_known(true);
+        assert!(hands.feed(&KeyEvent::new(KeyCode::Left, KeyModifiers::NONE), clock.now()));
+        assert_eq!(keyboard.intent(view).action(), Action(-5.0));
+        hands.release_all();
+        assert_eq!(keyboard.intent(view).action(), Action(0.0));
+    }
+
+    #[test]
+    fn shortcuts_do_not_steer_but_releases_always_count() {
+        let mut key = KeyEvent::new(KeyCode::Char('h'), KeyModifiers::CONTROL);
+        assert_eq!(direction(&key), None);
+        key.kind = KeyEventKind::Release;
+        assert_eq!(direction(&key), Some(Direction::Left));
+        assert_eq!(direction(&KeyEvent::new(KeyCode::Char('q'), KeyModifiers::NONE)), None);
+    }
+}

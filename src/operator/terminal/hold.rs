@@ -1,0 +1,340 @@
+//! Which way the keys push, from key events with their times; no clock in here.
+//!
+//! Where the terminal reports releases, a key pushes from press to release. Where it does
+//! not, a press pushes for a tap's time and each repeat for a little longer than the
+//! measured time between repeats. The key pressed last wins; a stop key ends every push,
+//! and only a new press starts one again.
+
+use crate::signal::Seconds;
+
+/// What a steering key stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// Push to the left: negative.
+    Left,
+    /// Push to the right: positive.
+    Right,
+    /// Push no more.
+    Stop,
+}
+
+/// How the program knows that a key was let go.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum KeyReleases {
+    /// The terminal says so.
+    Reported,
+    /// Guessed: the key's repeats stopped coming.
+    #[default]
+    Estimated,
+}
+
+impl KeyReleases {
+    /// The words for the screen and for `session.json`.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Reported => "reported by the terminal",
+            Self::Estimated => "estimated from key repeats",
+        }
+    }
+}
+
+/// The times of a [`Hold`], s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timing {
+    /// How long a single press pushes when releases are estimated.
+    pub tap_hold_s: f64,
+    /// How long a repeat pushes then; `None`: learned from the repeats.
+    pub repeat_hold_s: Option<f64>,
+    /// How long a push takes to grow to its full strength.
+    pub rise_s: f64,
+}
+
+/// A repeat pushes for this many intervals between repeats, when learned.
+const REPEAT_MARGIN: f64 = 1.6;
+/// The bounds of what a repeat may push when learned, s.
+const LEARNED_HOLD_S: (f64, f64) = (0.05, 0.2);
+/// Presses of one key closer than this are its repeats: no finger taps as fast.
+const REPEAT_GAP_S: f64 = LEARNED_HOLD_S.1 / REPEAT_MARGIN;
+/// Repeats closer than this came in one burst of a slow line and tell no interval.
+const BURST_GAP_S: f64 = 0.005;
+/// How much a new interval counts against those measured before.
+const NEW_INTERVAL: f64 = 0.25;
+
+/// A push that is going on.
+#[derive(Clone, Copy, Debug)]
+struct Push {
+    to: Direction,
+    since: Seconds,
+    /// When it ends by itself; reported keys end by their release alone.
+    until: Option<Seconds>,
+}
+
+/// The keys' state. Times must not run backwards.
+#[derive(Clone, Debug)]
+pub struct Hold {
+    timing: Timing,
+    releases: KeyReleases,
+    push: Option<Push>,
+    /// The keys held, left and right, as reported.
+    held: [bool; 2],
+    last_event: Option<(Direction, Seconds)>,
+    interval: Option<f64>,
+}
+
+impl Hold {
+    /// No key held, releases estimated until known better.
+    #[must_use]
+    pub const fn new(timing: Timing) -> Self {
+        Self {
+            timing,
+            releases: KeyReleases::Estimated,
+            push: None,
+            held: [false; 2],
+            last_event: None,
+            interval: None,
+        }
+    }
+
+    /// How releases are known.
+    #[must_use]
+    pub const fn knowledge(&self) -> KeyReleases {
+        self.releases
+    }
+
+    /// Says whether the terminal reports releases; a change lets all keys go.
+    pub fn set_knowledge(&mut self, releases: KeyReleases) {
+        if self.releases != releases {
+            self.releases = releases;
+            self.release_all();
+        }
+    }
+
+    /// The time of the last key event, if there was one.
+    #[must_use]
+    pub fn last_event(&self) -> Option<Seconds> {
+        self.last_event.map(|(_, at)| at)
+    }
+
+    /// A key went down. Terminals without releases send repeats as presses, too.
+    pub fn press(&mut self, direction: Direction, now: Seconds) {
+        let gap = self.note(direction, now);
+        match (direction, self.releases) {
+            (Direction::Stop, _) => self.release_all(),
+            (_, KeyReleases::Reported) => {
+                self.set_held(direction, true);
+                self.start(direction, now, None);
+            }
+            (_, KeyReleases::Estimated) => self.extend(direction, now, gap),
+        }
+    }
+
+    /// A key is still down.
+    pub fn repeat(&mut self, direction: Direction, now: Seconds) {
+        let gap = self.note(direction, now);
+        match (direction, self.releases) {
+            (Direction::Stop, _) => self.release_all(),
+            // After a stop or a pause only a new press pushes again.
+            (_, KeyReleases::Reported) => {}
+            (_, KeyReleases::Estimated) => self.extend(direction, now, gap),
+        }
+    }
+
+    /// A key went up: the terminal reports releases, whatever was believed before.
+    pub fn release(&mut self, direction: Direction, now: Seconds) {
+        if self.releases == KeyReleases::Estimated {
+            self.releases = KeyReleases::Reported;
+            // A push that is going on has its release still to come.
+            if let Some(push) = &mut self.push {
+                if push.until.take().is_some_and(|until| until > now) {
+                    let to = push.to;
+                    self.set_held(to, true);
+                } else {
+                    self.push = None;
+                }
+            }
+        }
+        self.last_event = Some((direction, now));
+        self.set_held(direction, false);
+        if self.push.is_some_and(|push| push.to == direction) {
+            self.push = None;
+            let other = match self.held {
+                [true, _] => Direction::Left,
+                [_, true] => Direction::Right,
+                _ => return,
+            };
+            self.start(other, now, None);
+        }
+    }
+
+    /// Lets all keys go: the focus is lost, or the session pauses.
+    pub fn release_all(&mut self) {
+        self.held = [false; 2];
+        self.push = None;
+        // The next press is a new one, not a repeat.
+        self.last_event = self.last_event.map(|(_, at)| (Direction::Stop, at));
+    }
+
+    /// The push at `now`, from -1 (left) to 1 (right).
+    #[must_use]
+    pub fn push(&self, now: Seconds) -> f64 {
+        let Some(push) = self.push else { return 0.0 };
+        if push.until.is_some_and(|until| now >= until) {
+            return 0.0;
+        }
+        let grown = if self.timing.rise_s > 0.0 {
+            ((now - push.since).0 / self.timing.rise_s).clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
+        match push.to {
+            Direction::Left => -grown,
+            Direction::Right => grown,
+            Direction::Stop => 0.0,
+        }
+    }
+
+    /// Notes the event and returns the time since the same key's last, if it was the last.
+    fn note(&mut self, direction: Direction, now: Seconds) -> Option<f64> {
+        let before = self.last_event.replace((direction, now));
+        before.filter(|(last, _)| *last == direction).map(|(_, at)| (now - at).0)
+    }
+
+    /// A press or repeat without knowledge of releases, `gap` after the same key's last.
+    fn extend(&mut self, direction: Direction, now: Seconds, gap: Option<f64>) {
+        let gap = gap.filter(|gap| *gap <= REPEAT_GAP_S);
+        if let Some(gap) = gap.filter(|gap| *gap >= BURST_GAP_S) {
+            let known = self.interval.unwrap_or(gap);
+            self.interval = Some(known + NEW_INTERVAL * (gap - known));
+        }
+        let hold = if gap.is_some() { self.repeat_hold() } else { self.timing.tap_hold_s };
+        self.start(direction, now, Some(now + Seconds(hold)));
+    }
+
+    fn repeat_hold(&self) -> f64 {
+        let learned =
+            |interval: f64| (REPEAT_MARGIN * interval).clamp(LEARNED_HOLD_S.0, LEARNED_HOLD_S.1);
+        self.timing.repeat_hold_s.or(self.interval.map(learned)).unwrap_or(self.timing.tap_hold_s)
+    }
+
+    /// Pushes to `to` from now, or on if it does already; never ends a push earlier.
+    fn start(&mut self, to: Direction, now: Seconds, until: Option<Seconds>) {
+        match &mut self.push {
+            Some(push) if push.to == to && push.until.is_none_or(|end| end > now) => {
+                push.until = match (push.until, until) {
+                    (Some(old), Some(new)) if old > new => Some(old),
+                    _ => until,
+                };
+            }
+            _ => self.push = Some(Push { to, since: now, until }),
+        }
+    }
+
+    fn set_held(&mut self, direction: Direction, down: bool) {
+        match direction {
+            Direction::Left => self.held[0] = down,
+            Direction::Right => self.held[1] = down,
+            Direction::Stop => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Direction::{Left, Right, Stop};
+    use proptest::prelude::*;
+
+    const TIMING: Timing = Timing { tap_hold_s: 0.12, repeat_hold_s: None, rise_s: 0.0 };
+
+    fn at(s: f64) -> Seconds {
+        Seconds(s)
+    }
+
+    #[test]
+    fn a_reported_key_pushes_until_its_release_and_the_last_pressed_wins() {
+        let mut hold = Hold::new(TIMING);
+        hold.set_knowledge(KeyReleases::Reported);
+        hold.press(Left, at(1.0));
+        assert_eq!(hold.push(at(9.0)), -1.0);
+        hold.press(Right, at(9.0));
+        assert_eq!(hold.push(at(9.0)), 1.0);
+        hold.release(Right, at(9.5));
+        assert_eq!(hold.push(at(9.5)), -1.0);
+        hold.press(Stop, at(9.6));
+        hold.repeat(Left, at(9.7));
+        assert_eq!(hold.push(at(9.8)), 0.0);
+    }
+
+    #[test]
+    fn an_estimated_key_pushes_for_a_tap_rests_in_the_gap_and_follows_the_repeats() {
+        let mut hold = Hold::new(TIMING);
+        hold.press(Right, at(0.0));
+        assert_eq!(hold.push(at(0.119)), 1.0);
+        assert_eq!(hold.push(at(0.12)), 0.0);
+        let mut now = 0.5;
+        for _ in 0..20 {
+            hold.press(Right, at(now));
+            now += 0.04;
+        }
+        let last = now - 0.04;
+        assert_eq!(hold.push(at(last + 0.06)), 1.0);
+        assert_eq!(hold.push(at(last + 0.065)), 0.0);
+        hold.press(Left, at(last + 0.07));
+        assert_eq!(hold.push(at(last + 0.08)), -1.0);
+        hold.press(Stop, at(last + 0.09));
+        assert_eq!(hold.push(at(last + 0.09)), 0.0);
+        assert_eq!(hold.knowledge(), KeyReleases::Estimated);
+    }
+
+    #[test]
+    fn a_push_grows_linearly_and_ends_at_once() {
+        let mut hold = Hold::new(Timing { rise_s: 0.06, ..TIMING });
+        hold.set_knowledge(KeyReleases::Reported);
+        hold.press(Left, at(0.0));
+        assert_eq!(hold.push(at(0.0)), 0.0);
+        assert!((hold.push(at(0.03)) + 0.5).abs() < 1e-12);
+        assert_eq!(hold.push(at(0.06)), -1.0);
+        hold.release(Left, at(0.07));
+        assert_eq!(hold.push(at(0.07)), 0.0);
+    }
+
+    #[test]
+    fn the_first_release_changes_what_is_known() {
+        let mut hold = Hold::new(TIMING);
+        hold.press(Left, at(0.0));
+        hold.release(Left, at(0.05));
+        assert_eq!(hold.push(at(0.06)), 0.0);
+        assert_eq!(hold.knowledge(), KeyReleases::Reported);
+        hold.press(Left, at(1.0));
+        assert_eq!(hold.push(at(5.0)), -1.0);
+    }
+
+    proptest! {
+        #[test]
+        fn keys_that_all_end_released_leave_0(
+            known in any::<bool>(),
+            events in proptest::collection::vec((0..3_u8, 0..3_u8, 0.0..0.5_f64), 0..60),
+        ) {
+            let mut hold = Hold::new(TIMING);
+            if known {
+                hold.set_knowledge(KeyReleases::Reported);
+            }
+            let mut now = 0.0;
+            for (kind, key, wait) in events {
+                now += wait;
+                let key = [Left, Right, Stop][usize::from(key)];
+                match kind {
+                    0 => hold.press(key, at(now)),
+                    1 => hold.repeat(key, at(now)),
+                    _ => hold.release(key, at(now)),
+                }
+                prop_assert!(hold.push(at(now)).abs() <= 1.0);
+            }
+            for key in [Left, Right, Stop] {
+                hold.release(key, at(now));
+            }
+            prop_assert_eq!(hold.push(at(now)), 0.0);
+        }
+    }
+}
