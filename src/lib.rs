@@ -7,6 +7,7 @@ pub mod control;
 pub mod learner;
 pub mod operator;
 pub mod plant;
+pub mod profile;
 pub mod random;
 pub mod record;
 pub mod session;

@@ -1,0 +1,128 @@
+//! The sections of a profile, listed once.
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize, Serializer};
+
+use super::experiment::Experiment;
+use super::{Screen, WantedMode};
+use crate::check::{Check, Checker};
+use crate::{session, sharing, teaching};
+
+/// Writes the two forms of a profile from one list of sections: [`Layout`], as it stands in
+/// a file, with the plant and rules of a task not yet known; and [`Profile`], as the
+/// program uses it.
+macro_rules! sections {
+    ($($(#[$about:meta])* $section:ident: $params:ty,)*) => {
+        /// A profile as it stands in a file, for a task with plant parameters `P` and rules
+        /// `R`.
+        #[derive(Clone, Debug, Serialize, Deserialize)]
+        #[serde(
+            rename = "Profile",
+            deny_unknown_fields,
+            default,
+            bound(deserialize = "P: DeserializeOwned + Default, R: DeserializeOwned + Default")
+        )]
+        pub(super) struct Layout<P, R> {
+            task: String,
+            preset: String,
+            mode: WantedMode,
+            tick_ms: f64,
+            plant: P,
+            rules: R,
+            $($section: $params,)*
+        }
+
+        impl<P: Default, R: Default> Default for Layout<P, R> {
+            fn default() -> Self {
+                Self {
+                    task: String::new(),
+                    preset: "thesis".to_owned(),
+                    mode: WantedMode::default(),
+                    tick_ms: 20.0,
+                    plant: P::default(),
+                    rules: R::default(),
+                    $($section: <$params>::default(),)*
+                }
+            }
+        }
+
+        impl<P, R> Layout<P, R> {
+            /// The profile of this layout, its plant and rules told apart by `experiment`.
+            pub(super) fn profile(self, experiment: impl FnOnce(P, R) -> Experiment) -> Profile {
+                Profile {
+                    experiment: experiment(self.plant, self.rules),
+                    preset: self.preset,
+                    mode: self.mode,
+                    tick_ms: self.tick_ms,
+                    $($section: self.$section,)*
+                }
+            }
+        }
+
+        /// Everything that a session's plan and behaviour depend on, subject and devices
+        /// aside.
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct Profile {
+            /// The task with its plant and rules: the keys `task`, `plant` and `rules`.
+            pub experiment: Experiment,
+            /// Whose settings these are: `thesis` for the published experiments.
+            pub preset: String,
+            /// What the robot does while it learns.
+            pub mode: WantedMode,
+            /// The control period, ms.
+            pub tick_ms: f64,
+            $($(#[$about])* pub $section: $params,)*
+        }
+
+        impl Profile {
+            /// The layout of this profile for its task's plant and rules.
+            pub(super) fn layout<P, R>(&self, plant: P, rules: R) -> Layout<P, R> {
+                Layout {
+                    task: self.experiment.name().to_owned(),
+                    preset: self.preset.clone(),
+                    mode: self.mode,
+                    tick_ms: self.tick_ms,
+                    plant,
+                    rules,
+                    $($section: self.$section.clone(),)*
+                }
+            }
+        }
+
+        impl Check for Profile {
+            fn check(&self, c: &mut Checker<'_>) {
+                c.demand(
+                    is_plain_name(&self.preset),
+                    "preset",
+                    format_args!("{:?}", self.preset),
+                    "a name of 1 to 32 small letters, digits and `-`",
+                );
+                c.range("tick_ms", self.tick_ms, 1.0..=1000.0);
+                self.experiment.check(c);
+                $(self.$section.check(&mut c.section(stringify!($section)));)*
+            }
+        }
+    };
+}
+
+sections! {
+    /// What the learner is given.
+    teaching: teaching::Params,
+    /// Who has how much of the controls.
+    sharing: sharing::Params,
+    /// Phases, rollouts and instructions.
+    session: session::plan::Params,
+    /// What is drawn, and how often.
+    screen: Screen,
+}
+
+impl Serialize for Profile {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.experiment.serialize(self, serializer)
+    }
+}
+
+fn is_plain_name(name: &str) -> bool {
+    (1..=32).contains(&name.len())
+        && name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-')
+}
