@@ -1,14 +1,53 @@
 //! What is kept of a session: the rows of its CSV files and its JSON files.
+//!
+//! ```text
+//! control ─ rows, checkpoints, policies ─▶ Recorder ─ bounded queue ─▶ writer thread ─▶ folder
+//! ```
+//!
+//! The CSV files are only appended to, whole rows at a time; the JSON files are replaced
+//! whole. A kill at any byte therefore leaves every whole row and the latest whole
+//! checkpoint readable, and [`Folder::resume`] goes on from there.
 
+pub mod assignment;
+pub mod checkpoint;
+mod document;
+mod error;
+pub mod evaluation;
+mod finite;
+pub mod folder;
+pub mod policy;
+pub mod reader;
+pub mod sidecar;
+mod table;
+pub mod writer;
+
+pub use checkpoint::{Checkpoint, Resumed};
+pub use error::Error;
+pub use evaluation::EvaluationRow;
+pub use folder::Folder;
+pub use policy::{Policy, read_policy};
+pub use sidecar::{Sidecar, Status, read_sidecar};
+pub use writer::{Manner, Recorder};
+
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::session::Phase;
 use crate::signal::{End, State};
 
+/// This program's version, as stored in every JSON file.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// A learner that can be stored and sent to the writer.
+pub trait Storable: Serialize + DeserializeOwned + Send + 'static {}
+
+impl<T: Serialize + DeserializeOwned + Send + 'static> Storable for T {}
+
 /// A row of `steps.csv`: the state sensed before the action, the actions of the tick, and
 /// the reward, share and success used in it. What is missing is an empty cell.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepRow {
+/// The fields are in the order of the columns. Rows read back own their region's name.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StepRow<Name = &'static str> {
     /// The phase.
     pub phase: Phase,
     /// The rollout within the phase, from 1.
@@ -34,7 +73,7 @@ pub struct StepRow {
     /// The success after this reward.
     pub success: Option<f64>,
     /// The name of the state's region.
-    pub region: Option<&'static str>,
+    pub region: Option<Name>,
     /// How late the tick began, µs; 0 on virtual time.
     pub lateness_us: u32,
 }
@@ -68,8 +107,8 @@ pub struct EpisodeRow {
 }
 
 /// A row of `events.csv`: a transition, fault, discard or change of a device.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct EventRow {
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct EventRow<Word = &'static str> {
     /// The wall's date and time; empty on virtual time.
     pub time: String,
     /// Where in the session, if anywhere.
@@ -79,7 +118,7 @@ pub struct EventRow {
     /// The step.
     pub step: Option<u32>,
     /// What happened, a word.
-    pub event: &'static str,
-    /// Why.
+    pub event: Word,
+    /// Why; line breaks become blanks when it is written.
     pub cause: String,
 }

@@ -1,0 +1,316 @@
+//! Reads tables back: every whole row, wherever the file was cut.
+
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use csv::StringRecord;
+use serde::Deserialize;
+use serde::de::IntoDeserializer;
+use serde::de::value::Error as WordError;
+
+use super::writer::{EPISODE_COLUMNS, EVENT_COLUMNS, STEP_COLUMNS};
+use super::{EpisodeRow, Error, EvaluationRow, EventRow, StepRow, table};
+use crate::signal::State;
+
+/// The rows of `steps.csv`, one at a time.
+pub struct Steps {
+    lines: Lines,
+    columns: Vec<String>,
+}
+
+impl Steps {
+    /// Opens a `steps.csv`.
+    ///
+    /// # Errors
+    /// When it cannot be read, or is another kind of table.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let lines = Lines::open(path, u64::MAX)?;
+        let (before, after) = STEP_COLUMNS;
+        let state = lines.header.iter().skip(before.len()).take_while(|name| *name != after[0]);
+        let columns: Vec<String> = state.map(str::to_owned).collect();
+        let expected: Vec<&str> =
+            before.into_iter().chain(columns.iter().map(String::as_str)).chain(after).collect();
+        lines.demand(&expected)?;
+        Ok(Self { lines, columns })
+    }
+
+    /// The names of the state's numbers.
+    #[must_use]
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    fn row(&self) -> Result<StepRow<String>, Error> {
+        let mut cells = self.lines.cells();
+        let (phase, episode, step, t) =
+            (cells.word()?, cells.value()?, cells.value()?, cells.value()?);
+        let mut state = Vec::with_capacity(self.columns.len());
+        for _ in &self.columns {
+            state.push(cells.value()?);
+        }
+        let state = State::from_slice(&state)
+            .ok_or_else(|| Error::unfit(&self.lines.path, "it has too many state columns"))?;
+        Ok(StepRow {
+            phase,
+            episode,
+            step,
+            t,
+            state,
+            u_human: cells.optional()?,
+            u_machine: cells.optional()?,
+            share: cells.optional()?,
+            u: cells.optional()?,
+            u_applied: cells.optional()?,
+            reward: cells.optional()?,
+            success: cells.optional()?,
+            region: cells.optional()?,
+            lateness_us: cells.value()?,
+        })
+    }
+}
+
+impl Iterator for Steps {
+    type Item = Result<StepRow<String>, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.lines.advance().map(|read| read.and_then(|()| self.row()))
+    }
+}
+
+/// The rows of `episodes.csv`, one at a time.
+pub struct Episodes {
+    lines: Lines,
+}
+
+impl Episodes {
+    /// Opens an `episodes.csv`.
+    ///
+    /// # Errors
+    /// When it cannot be read, or is another kind of table.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        Self::open_until(path, u64::MAX)
+    }
+
+    /// Opens the first `length` bytes of an `episodes.csv`.
+    pub(super) fn open_until(path: &Path, length: u64) -> Result<Self, Error> {
+        let lines = Lines::open(path, length)?;
+        lines.demand(&EPISODE_COLUMNS)?;
+        Ok(Self { lines })
+    }
+
+    fn row(&self) -> Result<EpisodeRow, Error> {
+        let mut cells = self.lines.cells();
+        Ok(EpisodeRow {
+            phase: cells.word()?,
+            episode: cells.value()?,
+            start: cells.value()?,
+            steps: cells.value()?,
+            duration_s: cells.value()?,
+            end: cells.word()?,
+            total: cells.value()?,
+            mean_reward: cells.value()?,
+            share: cells.optional()?,
+            success: cells.optional()?,
+            receptive_fields: cells.optional()?,
+        })
+    }
+}
+
+impl Iterator for Episodes {
+    type Item = Result<EpisodeRow, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.lines.advance().map(|read| read.and_then(|()| self.row()))
+    }
+}
+
+/// Reads an `events.csv` whole.
+///
+/// # Errors
+/// When it cannot be read, is another kind of table, or a cell is wrong.
+pub fn read_events(path: &Path) -> Result<Vec<EventRow<String>>, Error> {
+    let mut lines = Lines::open(path, u64::MAX)?;
+    lines.demand(&EVENT_COLUMNS)?;
+    let mut rows = Vec::new();
+    while let Some(read) = lines.advance() {
+        read?;
+        let mut cells = lines.cells();
+        rows.push(EventRow {
+            time: cells.value()?,
+            phase: cells.optional_word()?,
+            episode: cells.optional()?,
+            step: cells.optional()?,
+            event: cells.value()?,
+            cause: cells.value()?,
+        });
+    }
+    Ok(rows)
+}
+
+/// Reads an `evaluation.csv` whole.
+///
+/// # Errors
+/// When it cannot be read, is another kind of table, or a cell is wrong.
+pub fn read_evaluation(path: &Path) -> Result<Vec<EvaluationRow>, Error> {
+    let mut lines = Lines::open(path, u64::MAX)?;
+    lines.demand(&[
+        "policy",
+        "episode",
+        "start",
+        "steps",
+        "duration_s",
+        "end",
+        "return",
+        "mean_reward",
+    ])?;
+    let mut rows = Vec::new();
+    while let Some(read) = lines.advance() {
+        read?;
+        let mut cells = lines.cells();
+        rows.push(EvaluationRow {
+            policy: cells.value()?,
+            episode: cells.value()?,
+            start: cells.value()?,
+            steps: cells.value()?,
+            duration_s: cells.value()?,
+            end: cells.word()?,
+            total: cells.value()?,
+            mean_reward: cells.value()?,
+        });
+    }
+    Ok(rows)
+}
+
+/// The whole lines of a table.
+struct Lines {
+    path: PathBuf,
+    table: csv::Reader<io::Take<File>>,
+    /// Empty when not even the header is whole.
+    header: StringRecord,
+    record: StringRecord,
+}
+
+impl Lines {
+    fn open(path: &Path, length: u64) -> Result<Self, Error> {
+        let mut file = table::open_whole(path)?;
+        file.set_limit(file.limit().min(length));
+        let mut table = csv::ReaderBuilder::new().flexible(true).from_reader(file);
+        let header = table.headers().cloned().map_err(|fault| misread(path, fault))?;
+        Ok(Self { path: path.to_owned(), table, header, record: StringRecord::new() })
+    }
+
+    /// Demands these columns; later ones may follow.
+    fn demand(&self, expected: &[&str]) -> Result<(), Error> {
+        let wrong = expected.iter().zip(&self.header).find(|(expected, name)| **expected != *name);
+        if let Some((expected, name)) = wrong {
+            return Err(Error::Cell {
+                path: self.path.clone(),
+                line: 1,
+                column: name.to_owned(),
+                problem: format!("the column {expected} is expected here"),
+            });
+        }
+        match expected.get(self.header.len()) {
+            Some(missing) if !self.header.is_empty() => {
+                Err(Error::unfit(&self.path, format!("the column {missing} is missing")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Reads the next line.
+    fn advance(&mut self) -> Option<Result<(), Error>> {
+        match self.table.read_record(&mut self.record) {
+            Ok(true) => Some(Ok(())),
+            Ok(false) => None,
+            Err(fault) => Some(Err(misread(&self.path, fault))),
+        }
+    }
+
+    fn cells(&self) -> Cells<'_> {
+        Cells { lines: self, index: 0 }
+    }
+}
+
+fn misread(path: &Path, fault: csv::Error) -> Error {
+    match fault.into_kind() {
+        csv::ErrorKind::Io(cause) => Error::Io { action: "read", path: path.to_owned(), cause },
+        csv::ErrorKind::Utf8 { pos, err } => Error::Cell {
+            path: path.to_owned(),
+            line: pos.map_or(1, |pos| pos.line()),
+            column: (err.field() + 1).to_string(),
+            problem: "this is not text (UTF-8)".to_owned(),
+        },
+        other => Error::unfit(path, format!("this is not a readable table: {other:?}")),
+    }
+}
+
+/// The cells of a line, from left to right.
+struct Cells<'a> {
+    lines: &'a Lines,
+    index: usize,
+}
+
+impl<'a> Cells<'a> {
+    fn next(&mut self) -> Result<&'a str, Error> {
+        let cell = self.lines.record.get(self.index);
+        self.index += 1;
+        cell.ok_or_else(|| self.wrong("the line ends before this column"))
+    }
+
+    /// A fault of the cell taken last.
+    fn wrong(&self, problem: impl Into<String>) -> Error {
+        let column = self.lines.header.get(self.index - 1).unwrap_or("?");
+        Error::Cell {
+            path: self.lines.path.clone(),
+            line: self.lines.record.position().map_or(0, csv::Position::line),
+            column: column.to_owned(),
+            problem: problem.into(),
+        }
+    }
+
+    /// Whether the next cell is empty; it is then taken.
+    fn skip_empty(&mut self) -> bool {
+        let empty = self.lines.record.get(self.index) == Some("");
+        self.index += usize::from(empty);
+        empty
+    }
+
+    fn value<T: Kind>(&mut self) -> Result<T, Error> {
+        let cell = self.next()?;
+        cell.parse().map_err(|_| self.wrong(format!("{cell:?} is not {}", T::WORD)))
+    }
+
+    fn optional<T: Kind>(&mut self) -> Result<Option<T>, Error> {
+        if self.skip_empty() { Ok(None) } else { self.value().map(Some) }
+    }
+
+    /// One of the words of `T`.
+    fn word<T: Deserialize<'a>>(&mut self) -> Result<T, Error> {
+        let cell = self.next()?;
+        let word: Result<T, WordError> = T::deserialize(cell.into_deserializer());
+        word.map_err(|fault| self.wrong(fault.to_string()))
+    }
+
+    fn optional_word<T: Deserialize<'a>>(&mut self) -> Result<Option<T>, Error> {
+        if self.skip_empty() { Ok(None) } else { self.word().map(Some) }
+    }
+}
+
+/// What a cell can hold.
+trait Kind: std::str::FromStr {
+    const WORD: &'static str;
+}
+
+impl Kind for f64 {
+    const WORD: &'static str = "a number";
+}
+
+impl Kind for u32 {
+    const WORD: &'static str = "a whole number from 0 to 4294967295";
+}
+
+impl Kind for String {
+    const WORD: &'static str = "a text";
+}

@@ -1,0 +1,146 @@
+//! `session.json`: all that the rows do not say about a session.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::Error;
+use super::document::{self, Document};
+use crate::session::{Phase, Subject, Trial};
+use crate::sharing::Mode;
+
+/// How a session stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// It is being recorded, or the process that did so was killed.
+    #[default]
+    Running,
+    /// All phases took place.
+    Complete,
+    /// Somebody ended it.
+    Aborted,
+    /// A signal ended it.
+    Interrupted,
+    /// A fault ended it.
+    Failed,
+}
+
+/// The lateness of the ticks, µs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Lateness {
+    /// Half of the ticks were at most this late.
+    pub p50: u64,
+    /// 99 of 100 ticks were at most this late.
+    pub p99: u64,
+    /// The latest tick.
+    pub max: u64,
+}
+
+/// How well the host kept time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Timing {
+    /// Control ticks.
+    pub ticks: u64,
+    /// Ticks left out because their time had passed.
+    pub missed: u64,
+    /// Step rows lost because the disk was too slow.
+    pub lost_rows: u64,
+    /// How late the ticks began, µs.
+    pub lateness_us: Lateness,
+    /// Whether the control thread ran with real-time priority.
+    pub realtime_priority: bool,
+    /// Frames drawn.
+    pub screen_frames: u64,
+}
+
+/// The machine and the terminal.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Host {
+    /// The operating system and its version.
+    pub os: String,
+    /// The processor's architecture.
+    pub architecture: String,
+    /// The terminal, if there is one.
+    pub terminal: Option<String>,
+}
+
+/// That a session was taken up again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Resumption {
+    /// The wall's date and time.
+    pub at: String,
+    /// The program's version then.
+    pub version: String,
+    /// The phase that it went on with.
+    pub phase: Phase,
+    /// The rollout that it went on with.
+    pub episode: u32,
+    /// Step rows of the cut rollout that were dropped.
+    pub dropped_steps: u64,
+}
+
+/// The content of `session.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sidecar {
+    /// The program's version.
+    pub version: String,
+    /// The task's name outside, such as `swing-up`.
+    pub task: String,
+    /// The profile's name.
+    pub preset: String,
+    /// What the robot does while it learns.
+    pub mode: Mode,
+    /// Whether the mode was assigned by the program.
+    pub assigned: bool,
+    /// The learner's word.
+    pub learner: String,
+    /// Who steers, as on the command line.
+    pub operator: String,
+    /// What is steered, as on the command line.
+    pub backend: String,
+    /// The subject.
+    pub subject: Subject,
+    /// The trial.
+    pub trial: Trial,
+    /// The seed, given or drawn.
+    pub seed: u64,
+    /// How the session stands.
+    pub status: Status,
+    /// The wall's date and time at its beginning.
+    pub started: String,
+    /// The wall's date and time at its end.
+    pub ended: Option<String>,
+    /// How the keyboard's releases were known, when there was a keyboard.
+    pub key_releases: Option<String>,
+    /// The devices that took part.
+    pub devices: Vec<String>,
+    /// The machine and the terminal.
+    pub host: Host,
+    /// How well the host kept time; only on the wall's time.
+    pub timing: Option<Timing>,
+    /// The planned phases, in order.
+    pub planned: Vec<Phase>,
+    /// The whole effective profile as a profile file, from which a resume sets up again.
+    pub profile_ron: String,
+    /// The same for programs that read JSON only.
+    pub profile: serde_json::Value,
+    /// The results by phase.
+    pub phases: BTreeMap<String, serde_json::Value>,
+    /// When the session was resumed.
+    pub resumed: Vec<Resumption>,
+}
+
+impl Document for Sidecar {
+    const KIND: &'static str = "session";
+    const PRETTY: bool = true;
+}
+
+/// Reads a `session.json`.
+///
+/// # Errors
+/// When it is missing, cut off, not a session's, of a newer schema or holds a wrong value.
+pub fn read_sidecar(path: &Path) -> Result<Sidecar, Error> {
+    document::read(path)
+}
