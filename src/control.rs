@@ -1,3 +1,6 @@
 //! The control thread: one tick, one straight line; and what others see of it.
 
+pub mod cycle;
+mod effects;
 pub mod snapshot;
+pub mod witness;

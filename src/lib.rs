@@ -10,6 +10,8 @@ pub mod plant;
 pub mod profile;
 pub mod random;
 pub mod record;
+pub mod report;
+
 pub mod session;
 pub mod sharing;
 pub mod signal;

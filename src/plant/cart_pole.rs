@@ -39,9 +39,9 @@ pub struct Params {
     pub cart_mass_kg: f64,
     /// Gravity, m/s².
     pub gravity_m_s2: f64,
-    /// σ_θ of eq. 14, 1/s.
+    /// `σ_θ` of eq. 14, 1/s.
     pub pole_friction_per_s: f64,
-    /// σ_x of eq. 15, 1/s.
+    /// `σ_x` of eq. 15, 1/s.
     pub cart_friction_per_s: f64,
     /// ρ of eq. 14–15 is drawn uniformly from ± this each control step, 1/s.
     pub friction_noise_per_s: f64,

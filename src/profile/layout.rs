@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use super::experiment::Experiment;
 use super::{Screen, WantedMode};
 use crate::check::{Check, Checker};
-use crate::{session, sharing, teaching};
+use crate::{learner, operator, session, sharing, teaching};
 
 /// Writes the two forms of a profile from one list of sections: [`Layout`], as it stands in
 /// a file, with the plant and rules of a task not yet known; and [`Profile`], as the
@@ -106,12 +106,16 @@ macro_rules! sections {
 }
 
 sections! {
+    /// What learns, and how.
+    learner: learner::Params,
     /// What the learner is given.
     teaching: teaching::Params,
     /// Who has how much of the controls.
     sharing: sharing::Params,
     /// Phases, rollouts and instructions.
     session: session::plan::Params,
+    /// Hands and simulated people.
+    operator: operator::Params,
     /// What is drawn, and how often.
     screen: Screen,
 }

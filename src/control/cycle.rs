@@ -1,0 +1,419 @@
+//! ONE control tick, from sensing to publishing, in a straight line.
+//!
+//! The same cycle serves the screen, headless runs and evaluation; only the clock, the
+//! operator and the witness differ.
+
+use hdrhistogram::Histogram;
+
+use super::snapshot::{Command, MOST_REGIONS, Publisher, Snapshot};
+use super::witness::{Happening, Standing, Witness};
+use crate::backend::safety::Safe;
+use crate::backend::{Backend, Sensed};
+use crate::clock::{Clock, Pacer, Wake};
+use crate::learner::{Learner, Model};
+use crate::operator::{Feedback, Operator, View};
+use crate::record::{EpisodeRow, StepRow};
+use crate::session::machine::{self, Event, Finish, Stage};
+use crate::session::plan::Plan;
+use crate::session::{Moment, Phase};
+use crate::sharing::weight::Opened;
+use crate::sharing::{self, Mode, Sharing, mix};
+use crate::signal::{Action, End, Intent, Seconds, State, Tick};
+use crate::task::Task;
+use crate::teaching;
+
+/// Who and what takes part.
+pub struct Crew {
+    /// What the plant is used for.
+    pub task: Box<dyn Task>,
+    /// The plant, within its limits.
+    pub backend: Safe,
+    /// Who steers.
+    pub operator: Box<dyn Operator>,
+    /// Who writes it down.
+    pub witness: Box<dyn Witness>,
+    /// Who may look and ask; nobody in an evaluation.
+    pub publisher: Option<Publisher>,
+}
+
+/// How the session goes.
+#[derive(Clone, Debug)]
+pub struct Rules {
+    /// Phases, rollouts, starts.
+    pub plan: Plan,
+    /// The time of a control step.
+    pub tick: Seconds,
+    /// Whether the robot takes over while it learns.
+    pub mode: Mode,
+    /// How control is shared.
+    pub sharing: sharing::Params,
+    /// What the learner is given.
+    pub teaching: teaching::Params,
+    /// The learner that main begins with.
+    pub fresh: Model,
+}
+
+/// What a session led to.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// How it finished.
+    pub finish: Finish,
+    /// Why it was ended early.
+    pub cause: Option<String>,
+    /// The learner at its end.
+    pub learner: Model,
+    /// Windows, shares and gates at its end.
+    pub sharing: Sharing,
+    /// All its rollouts, discarded ones included.
+    pub episodes: Vec<EpisodeRow>,
+    /// Samples learned,
+    pub learned: u64,
+    /// and refused because they were not finite.
+    pub refused: u64,
+    /// The lateness of ticks, µs; empty on virtual time.
+    pub lateness_us: Option<Histogram<u64>>,
+    /// Ticks left out.
+    pub missed: u64,
+    /// Why writing failed, if it did.
+    pub fault: Option<String>,
+}
+
+/// The learner, the shares and their counts: what a discard restores.
+#[derive(Clone)]
+pub(super) struct Mind {
+    pub(super) learner: Model,
+    pub(super) sharing: Sharing,
+    pub(super) learned: u64,
+    pub(super) refused: u64,
+}
+
+/// The rollout under way.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Rollout {
+    pub(super) start: f64,
+    pub(super) total_reward: f64,
+    pub(super) steps: u32,
+}
+
+/// A session under way.
+pub struct Cycle {
+    pub(super) rules: Rules,
+    pub(super) crew: Crew,
+    pub(super) stage: Stage,
+    pub(super) mind: Mind,
+    pub(super) before_rollout: Option<Mind>,
+    pub(super) rollout: Rollout,
+    pub(super) practice: u32,
+    pub(super) tenths: u8,
+    pub(super) episodes: Vec<EpisodeRow>,
+    pub(super) cause: Option<String>,
+    pub(super) seen: Snapshot,
+    lateness_us: Option<Histogram<u64>>,
+}
+
+impl Cycle {
+    /// A session from its beginning, or from where it stood. `learner` is what an
+    /// autonomous phase without a main phase uses.
+    #[must_use]
+    pub fn new(rules: Rules, crew: Crew, learner: Model, from: Option<Standing>) -> Self {
+        let sharing = Sharing::new(&rules.sharing, rules.mode, crew.task.regions());
+        let mind = Mind { learner, sharing, learned: 0, refused: 0 };
+        let moment = from.as_ref().map(|standing| standing.moment);
+        let (stage, effects) = machine::begin(&rules.plan, moment);
+        let mut cycle = Self {
+            rules,
+            crew,
+            stage,
+            mind,
+            before_rollout: None,
+            rollout: Rollout::default(),
+            practice: 0,
+            tenths: 0,
+            episodes: Vec::new(),
+            cause: None,
+            seen: Snapshot::before(stage),
+            lateness_us: Histogram::new_with_max(60_000_000, 3).ok(),
+        };
+        let is_new = from.is_none();
+        if let Some(standing) = from {
+            cycle.recall(standing);
+        }
+        cycle.carry_out(&effects);
+        if is_new {
+            cycle.store_standing();
+        }
+        cycle
+    }
+
+    fn recall(&mut self, standing: Standing) {
+        if let Some(learner) = standing.learner {
+            self.mind.learner = learner;
+        }
+        self.mind.sharing = standing.sharing;
+        self.mind.learned = standing.learned;
+        self.mind.refused = standing.refused;
+        self.practice = standing.practice;
+        self.tenths = standing.tenths;
+    }
+
+    /// Runs the session to its end.
+    #[must_use]
+    pub fn run(mut self, clock: &mut dyn Clock) -> Outcome {
+        let mut pacer = Pacer::new(clock);
+        while !matches!(self.stage, Stage::Finished(_)) {
+            let speed = self.speed();
+            let wake = if speed.is_finite() {
+                pacer.wait(clock, Seconds(self.rules.tick.0 / speed))
+            } else {
+                pacer.skip(clock)
+            };
+            self.tick(wake, clock);
+        }
+        self.into_outcome()
+    }
+
+    /// One control tick.
+    fn tick(&mut self, wake: Wake, clock: &dyn Clock) {
+        self.note_lateness(wake, clock);
+        self.obey();
+        let end = match self.stage {
+            Stage::Running(moment) => self.control(moment),
+            Stage::Hold { moment, ticks_left } => {
+                self.hold(moment, ticks_left);
+                None
+            }
+            _ => None,
+        };
+        self.happen(Event::Tick(end));
+        self.publish();
+    }
+
+    /// A tick under control: sense, decide, actuate; then learn and write down.
+    fn control(&mut self, moment: Moment) -> Option<End> {
+        let sensed = self.crew.backend.sense();
+        let state = sensed.state;
+        let region = self.crew.task.region(&state);
+        let human = if moment.phase.is_steered() {
+            self.intent(&state, f64::from(moment.step) * self.rules.tick.0)
+        } else {
+            Intent::Absent
+        };
+        let features = self.crew.task.features(&state);
+        let machine = self.predict(moment.phase, &features);
+        let share = self.share(moment.phase, region);
+        let wanted = match (share, machine) {
+            (Some(share), machine) => mix(share, human.action().0, machine.unwrap_or(0.0)),
+            (None, _) => 0.0,
+        };
+        let applied = self.crew.backend.actuate(Action(wanted)).0;
+        // The time-critical half ends here.
+
+        let task = &*self.crew.task;
+        let reward = task.reward(&state);
+        let mut success = None;
+        if moment.phase == Phase::Main {
+            let observed = self.mind.sharing.observe(region, task.measure(&state));
+            success = Some(observed.success);
+            self.teach(&features, human, applied);
+            if observed.gate_opened {
+                self.note_gate(moment, region);
+            }
+        }
+        let Sensed { state: next, .. } = self.crew.backend.sense();
+        let end = self.crew.task.end(&next, moment.step + 1);
+        if moment.phase.is_steered() {
+            let told =
+                Feedback { state: &state, applied: Action(applied), reward, next: &next, end };
+            self.crew.operator.told(&told);
+        }
+        self.rollout.total_reward += reward;
+        self.rollout.steps += 1;
+        let row = StepRow {
+            phase: moment.phase,
+            episode: moment.rollout,
+            step: moment.step,
+            t: f64::from(moment.step) * self.rules.tick.0,
+            state,
+            u_human: human.is_present().then_some(human.action().0),
+            u_machine: machine,
+            share,
+            u: Some(wanted),
+            u_applied: Some(applied),
+            reward: Some(reward),
+            success,
+            region: self.crew.task.regions().get(region).map(|r| r.name),
+            lateness_us: micros(self.seen.lateness),
+        };
+        self.crew.witness.step(&row);
+        self.see(&row, human, region);
+        end
+    }
+
+    /// A tick of countdown: the operator looks, and nothing moves.
+    fn hold(&mut self, moment: Moment, ticks_left: u32) {
+        let Sensed { state, .. } = self.crew.backend.sense();
+        let time = (f64::from(moment.step) - f64::from(ticks_left)) * self.rules.tick.0;
+        let human =
+            if moment.phase.is_steered() { self.intent(&state, time) } else { Intent::Absent };
+        self.seen.state = state;
+        self.seen.human = human;
+        self.seen.machine = None;
+        self.seen.action = 0.0;
+        self.seen.applied = 0.0;
+    }
+
+    fn intent(&mut self, state: &State, rollout_time: f64) -> Intent {
+        #[expect(clippy::cast_precision_loss, reason = "a tick count far below 2^52")]
+        let now = Seconds(self.seen.tick.0 as f64 * self.rules.tick.0);
+        let rollout_time = Seconds(rollout_time);
+        let limit = self.crew.task.action_limit();
+        match self.crew.operator.intent(View { state, now, rollout_time }) {
+            // A device's nonsense is nobody's wish.
+            Intent::Present { action, .. } if !action.0.is_finite() => Intent::Absent,
+            Intent::Present { action, age } => {
+                Intent::Present { action: Action(action.0.clamp(-limit, limit)), age }
+            }
+            Intent::Absent => Intent::Absent,
+        }
+    }
+
+    /// What the learner would do, where it is asked.
+    fn predict(&self, phase: Phase, features: &[f64]) -> Option<f64> {
+        matches!(phase, Phase::Main | Phase::Autonomous).then(|| {
+            let mut action = [0.0];
+            self.mind.learner.predict(features, &mut action);
+            action[0]
+        })
+    }
+
+    /// The person's share; none where nobody steers at all.
+    fn share(&self, phase: Phase, region: usize) -> Option<f64> {
+        match phase {
+            Phase::Introduction => Some(1.0),
+            Phase::Main => Some(self.mind.sharing.share(region)),
+            Phase::Autonomous => Some(0.0),
+            Phase::ZeroControl => None,
+        }
+    }
+
+    fn teach(&mut self, features: &crate::signal::Features, human: Intent, applied: f64) {
+        let lesson = teaching::lesson(&self.rules.teaching, *features, human, applied);
+        if let Some(lesson) = lesson {
+            match self.mind.learner.update(&lesson.x, &[lesson.y], lesson.weight) {
+                Ok(()) => self.mind.learned += 1,
+                Err(_) => self.mind.refused += 1,
+            }
+        }
+    }
+
+    fn note_gate(&mut self, moment: Moment, region: usize) {
+        if let Some(Opened { step, tau_steps }) = self.mind.sharing.gate(region) {
+            self.crew.witness.happening(Happening {
+                event: "gate_opened",
+                moment: Some(moment),
+                phase: None,
+                cause: format!("success reached the gate at step {step}; tau {tau_steps} steps"),
+            });
+        }
+    }
+
+    /// Takes what was asked since the last tick.
+    fn obey(&mut self) {
+        while let Some(command) = self.crew.publisher.as_ref().and_then(Publisher::pending) {
+            let event = match command {
+                Command::Begin => Event::Begin,
+                Command::Pause => Event::Pause,
+                Command::Discard => Event::Discard,
+                Command::Stop => Event::Stop,
+                Command::Abort(cause) => {
+                    self.cause.get_or_insert(cause);
+                    Event::Abort
+                }
+                Command::Speed(speed) => {
+                    self.seen.speed = if speed > 0.0 { speed } else { 1.0 };
+                    continue;
+                }
+            };
+            self.happen(event);
+        }
+    }
+
+    /// Faster than the wall only where no hand is on the controls.
+    fn speed(&self) -> f64 {
+        match self.stage {
+            Stage::Hold { moment, .. } | Stage::Running(moment) if !moment.phase.is_steered() => {
+                self.seen.speed
+            }
+            _ => 1.0,
+        }
+    }
+
+    fn note_lateness(&mut self, wake: Wake, clock: &dyn Clock) {
+        self.seen.tick = Tick(self.seen.tick.0 + 1 + wake.missed);
+        if clock.is_wall() {
+            self.seen.lateness = wake.lateness;
+            self.seen.missed += wake.missed;
+            if let Some(histogram) = &mut self.lateness_us {
+                histogram.saturating_record(u64::from(micros(wake.lateness)));
+            }
+        }
+    }
+
+    /// Keeps the tick for the screen.
+    fn see(&mut self, row: &StepRow, human: Intent, region: usize) {
+        self.seen.state = row.state;
+        self.seen.human = human;
+        self.seen.machine = row.u_machine;
+        self.seen.action = row.u.unwrap_or(0.0);
+        self.seen.applied = row.u_applied.unwrap_or(0.0);
+        self.seen.region = region;
+        self.seen.reward = row.reward.unwrap_or(0.0);
+    }
+
+    /// Shows this tick to whoever looks.
+    fn publish(&mut self) {
+        let Some(publisher) = &self.crew.publisher else { return };
+        let phase = self.stage.moment().map(|moment| moment.phase);
+        for region in 0..self.crew.task.regions().len().min(MOST_REGIONS) {
+            self.seen.shares[region] = match phase {
+                Some(Phase::Introduction) | None => 1.0,
+                Some(Phase::Main) => self.mind.sharing.share(region),
+                Some(Phase::Autonomous | Phase::ZeroControl) => 0.0,
+            };
+            self.seen.successes[region] = self.mind.sharing.success(region);
+        }
+        self.seen.stage = self.stage;
+        self.seen.gate = self.mind.sharing.gate(self.seen.region);
+        self.seen.fields = u32::try_from(self.mind.learner.fields()).unwrap_or(u32::MAX);
+        self.seen.learned = self.mind.learned;
+        self.seen.lost_rows = self.crew.witness.lost();
+        publisher.publish(&self.seen);
+    }
+
+    fn into_outcome(mut self) -> Outcome {
+        self.crew.backend.halt();
+        self.publish();
+        let finish = match self.stage {
+            Stage::Finished(finish) => finish,
+            _ => Finish::Aborted,
+        };
+        Outcome {
+            finish,
+            cause: self.cause,
+            learner: self.mind.learner,
+            sharing: self.mind.sharing,
+            episodes: self.episodes,
+            learned: self.mind.learned,
+            refused: self.mind.refused,
+            lateness_us: self.lateness_us,
+            missed: self.seen.missed,
+            fault: self.crew.witness.fault(),
+        }
+    }
+}
+
+fn micros(lateness: Seconds) -> u32 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    let micros = (lateness.0 * 1e6) as u32;
+    micros
+}

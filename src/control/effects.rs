@@ -1,0 +1,246 @@
+//! What the cycle does about a transition of the session.
+
+use super::cycle::{Cycle, Mind, Rollout};
+use super::witness::{Happening, Standing};
+use crate::backend::Backend;
+use crate::learner::Learner;
+use crate::record::{EpisodeRow, StepRow};
+use crate::session::machine::{self, Effect, Event, Stage};
+use crate::session::plan::Start;
+use crate::session::{Moment, Phase};
+use crate::sharing::Sharing;
+use crate::signal::End;
+
+impl Cycle {
+    /// Lets `event` happen to the session, and carries out what follows.
+    pub(super) fn happen(&mut self, event: Event) {
+        let before = self.stage;
+        let (stage, effects) = machine::transition(&self.rules.plan, before, event);
+        self.stage = stage;
+        self.note_event(before, event);
+        self.carry_out(&effects);
+        if let Stage::Running(moment) = self.stage
+            && event == Event::Tick(None)
+        {
+            self.store_tenths(moment, moment.rollout - 1);
+            self.heed_trip();
+        }
+        let closed = effects
+            .iter()
+            .any(|effect| matches!(effect, Effect::Close { end, .. } if *end != End::Aborted));
+        if closed {
+            self.store_standing();
+            self.heed_fault();
+        }
+    }
+
+    /// Carries out effects in order.
+    pub(super) fn carry_out(&mut self, effects: &[Effect]) {
+        for effect in effects {
+            match *effect {
+                Effect::Halt => self.crew.backend.halt(),
+                Effect::Enter(phase) => self.enter(phase),
+                Effect::Prepare(moment) => self.prepare(moment),
+                Effect::Release(_) => {}
+                Effect::Close { moment, end } => self.close(moment, end),
+                Effect::Restore => {
+                    if let Some(mind) = self.before_rollout.take() {
+                        self.mind = mind;
+                    }
+                }
+                Effect::Leave(phase) => self.leave(phase),
+                Effect::Finish(how) => {
+                    let cause = self.cause.clone().unwrap_or_default();
+                    self.note(format_finish(how), None, None, cause);
+                }
+            }
+        }
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        if phase == Phase::Main {
+            self.mind = Mind {
+                learner: self.rules.fresh.clone(),
+                sharing: Sharing::new(
+                    &self.rules.sharing,
+                    self.rules.mode,
+                    self.crew.task.regions(),
+                ),
+                learned: 0,
+                refused: 0,
+            };
+            self.tenths = 0;
+        }
+        self.note("phase", None, Some(phase), String::new());
+    }
+
+    fn leave(&mut self, phase: Phase) {
+        if phase == Phase::Main {
+            self.crew.witness.policy(None, &self.mind.learner);
+        }
+    }
+
+    fn prepare(&mut self, moment: Moment) {
+        let task = &*self.crew.task;
+        let start = match self.rules.plan.start(&moment) {
+            Start::Random(mut chance) => task.random_start(&mut chance),
+            Start::Grid { index, count } => task.grid_start(index, count),
+        };
+        self.rollout = Rollout { start: task.start_value(&start), ..Rollout::default() };
+        self.crew.backend.prepare(start, moment.place());
+        self.seen.state = start;
+        self.before_rollout = None;
+        if moment.phase.is_steered() {
+            self.crew.operator.begin(moment.place(), self.practice);
+            if self.rules.plan.attended {
+                self.before_rollout = Some(self.mind.clone());
+            }
+        }
+    }
+
+    /// A rollout is over: its ending state, its row, its policies.
+    fn close(&mut self, moment: Moment, end: End) {
+        let state = self.crew.backend.sense().state;
+        self.crew.witness.step(&StepRow {
+            phase: moment.phase,
+            episode: moment.rollout,
+            step: moment.step,
+            t: f64::from(moment.step) * self.rules.tick.0,
+            state,
+            u_human: None,
+            u_machine: None,
+            share: None,
+            u: None,
+            u_applied: None,
+            reward: None,
+            success: None,
+            region: None,
+            lateness_us: 0,
+        });
+        let row = self.episode_row(moment, end);
+        self.crew.witness.episode(&row);
+        if let Some(publisher) = &self.crew.publisher {
+            publisher.rollout(row);
+        }
+        self.episodes.push(row);
+        if matches!(end, End::Discarded | End::Aborted) {
+            return;
+        }
+        if moment.phase.is_steered() {
+            self.practice += 1;
+        }
+        self.store_tenths(moment, moment.rollout);
+    }
+
+    fn episode_row(&self, moment: Moment, end: End) -> EpisodeRow {
+        let state = self.seen.state;
+        let region = self.crew.task.region(&state);
+        let is_main = moment.phase == Phase::Main;
+        let fields = u32::try_from(self.mind.learner.fields()).unwrap_or(u32::MAX);
+        let steps = self.rollout.steps.max(1);
+        EpisodeRow {
+            phase: moment.phase,
+            episode: moment.rollout,
+            start: self.rollout.start,
+            steps: moment.step,
+            duration_s: f64::from(moment.step) * self.rules.tick.0,
+            end,
+            total: self.rollout.total_reward,
+            mean_reward: self.rollout.total_reward / f64::from(steps),
+            share: match moment.phase {
+                Phase::Introduction => Some(1.0),
+                Phase::Main => Some(self.mind.sharing.share(region)),
+                Phase::Autonomous => Some(0.0),
+                Phase::ZeroControl => None,
+            },
+            success: is_main.then(|| self.mind.sharing.success(region)),
+            receptive_fields: (is_main || moment.phase == Phase::Autonomous).then_some(fields),
+        }
+    }
+
+    /// Stores the policies of the tenths of main that are over now.
+    fn store_tenths(&mut self, moment: Moment, rollouts: u32) {
+        if moment.phase != Phase::Main {
+            return;
+        }
+        let steps = moment.steps_before + u64::from(moment.step);
+        let over = self.rules.plan.tenths(Phase::Main, rollouts, steps);
+        while self.tenths < over {
+            self.tenths += 1;
+            self.crew.witness.policy(Some(self.tenths * 10), &self.mind.learner);
+        }
+    }
+
+    /// Stores where a cut session would go on. The learner is left out once it is frozen:
+    /// it is the final policy then.
+    pub(super) fn store_standing(&mut self) {
+        let Some(moment) = self.stage.moment() else { return };
+        let learns = moment.phase.is_steered();
+        self.crew.witness.standing(Standing {
+            moment,
+            learner: learns.then(|| self.mind.learner.clone()),
+            sharing: self.mind.sharing.clone(),
+            learned: self.mind.learned,
+            refused: self.mind.refused,
+            practice: self.practice,
+            tenths: self.tenths,
+        });
+    }
+
+    /// A tripped limit is an emergency stop that nobody had to press.
+    fn heed_trip(&mut self) {
+        if let Some(trip) = self.crew.backend.tripped() {
+            self.note("tripped", self.stage.moment(), None, trip.to_string());
+            self.happen(Event::Stop);
+            if !self.rules.plan.attended {
+                self.cause.get_or_insert_with(|| trip.to_string());
+                self.happen(Event::Abort);
+            }
+        }
+    }
+
+    /// A session that cannot be written down is ended: nothing more would be kept.
+    fn heed_fault(&mut self) {
+        if matches!(self.stage, Stage::Finished(_)) {
+            return;
+        }
+        if let Some(fault) = self.crew.witness.fault() {
+            self.cause.get_or_insert(fault);
+            self.happen(Event::Abort);
+        }
+    }
+
+    /// Writes down what people asked for; ticks speak through their rows.
+    fn note_event(&mut self, before: Stage, event: Event) {
+        let word = match event {
+            Event::Tick(_) => return,
+            Event::Begin => "begin",
+            Event::Pause if matches!(before, Stage::Paused(_)) => "go_on",
+            Event::Pause => "pause",
+            Event::Discard => "discard",
+            Event::Stop => "stop",
+            Event::Abort => "abort",
+        };
+        if self.stage != before {
+            let cause = self.cause.clone().unwrap_or_default();
+            self.note(word, before.moment(), None, cause);
+        }
+    }
+
+    fn note(
+        &mut self,
+        event: &'static str,
+        moment: Option<Moment>,
+        phase: Option<Phase>,
+        cause: String,
+    ) {
+        self.crew.witness.happening(Happening { event, moment, phase, cause });
+    }
+}
+
+const fn format_finish(how: machine::Finish) -> &'static str {
+    match how {
+        machine::Finish::Complete => "complete",
+        machine::Finish::Aborted => "aborted",
+    }
+}

@@ -1,0 +1,3 @@
+//! What came out: measures of a session's rollouts.
+
+pub mod metrics;
