@@ -1,5 +1,7 @@
 //! RFWR against golden runs of the first author's program, and its promises.
 
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking, helpers too")]
+
 use std::fs::File;
 use std::io::Read;
 use std::path::PathBuf;
@@ -231,8 +233,8 @@ fn agrees_with_the_golden_runs() {
 }
 
 /// A learner for `inputs` numbers as a profile makes it, with tight norms.
-fn profiled(params: Params, inputs: usize) -> Model {
-    Params { norm_in: vec![1.0; inputs], ..params }.build(inputs, 10.0).unwrap()
+fn profiled(params: &Params, inputs: usize) -> Model {
+    Params { norm_in: vec![1.0; inputs], ..params.clone() }.build(inputs, 10.0).unwrap()
 }
 
 fn stored(model: &impl serde::Serialize) -> String {
@@ -250,7 +252,7 @@ fn sample(k: u32) -> ([f64; 2], [f64; 1]) {
 #[test]
 fn a_reloaded_learner_is_equal_and_learns_on_equally() {
     for (diag_only, meta) in [(true, false), (false, true)] {
-        let mut model = profiled(Params { diag_only, meta, ..Params::default() }, 2);
+        let mut model = profiled(&Params { diag_only, meta, ..Params::default() }, 2);
         for k in 0..800 {
             let (x, y) = sample(k);
             model.update(&x, &y, 1.0).unwrap();
@@ -269,7 +271,7 @@ fn a_reloaded_learner_is_equal_and_learns_on_equally() {
 
 #[test]
 fn damaged_files_are_refused_by_name() {
-    let mut model = profiled(Params::default(), 2);
+    let mut model = profiled(&Params::default(), 2);
     for k in 0..100 {
         let (x, y) = sample(k);
         model.update(&x, &y, 1.0).unwrap();
@@ -295,7 +297,7 @@ fn norms_must_fit_the_inputs() {
 
 #[test]
 fn bad_samples_are_refused_and_leave_no_trace() {
-    let mut model = profiled(Params::default(), 2);
+    let mut model = profiled(&Params::default(), 2);
     model.update(&[0.1, 0.2], &[1.0], 1.0).unwrap();
     let before = stored(&model);
     assert!(model.update(&[f64::NAN, 0.0], &[1.0], 1.0).is_err());
@@ -308,7 +310,7 @@ fn bad_samples_are_refused_and_leave_no_trace() {
 
 #[test]
 fn no_field_is_added_at_the_cap() {
-    let mut model = profiled(Params { max_fields: 3, ..Params::default() }, 2);
+    let mut model = profiled(&Params { max_fields: 3, ..Params::default() }, 2);
     for k in 0..500 {
         let (x, y) = sample(k);
         model.update(&x, &y, 1.0).unwrap();
@@ -393,7 +395,7 @@ proptest! {
     ) {
         let kernel = if bi_square { Kernel::BiSquare } else { Kernel::Gaussian };
         let params = Params { diag_only, meta, kernel, ..Params::default() };
-        let Model::Rfwr(mut rfwr) = profiled(params, 2);
+        let Model::Rfwr(mut rfwr) = profiled(&params, 2);
         for (x, y, weight) in &samples {
             let update = rfwr.learn(x, &[*y], *weight).unwrap();
             prop_assert!(update.output[0].abs() <= 10.0);

@@ -1,7 +1,7 @@
 //! The shape of a receptive field, learned by gradient descent.
 //!
-//! The metric is kept as D = MᵀM with M upper triangular, so that D stays positive
-//! whatever the steps on M are. The cost of a field is J = J₁ + J₂: the mean squared
+//! The metric is kept as `D = MᵀM` with M upper triangular, so that D stays positive
+//! whatever the steps on M are. The cost of a field is `J = J₁ + J₂`: the mean squared
 //! leave-one-out error within the field, and γ Σ D², which keeps fields from shrinking to
 //! nothing. A step follows
 //!
@@ -26,7 +26,7 @@ const LOG_RATE_LIMIT: f64 = 10.0;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Metric {
-    /// M of D = MᵀM.
+    /// M of `D = MᵀM`.
     pub m: Vec<f64>,
     /// The learning rates α.
     pub alpha: Vec<f64>,
@@ -109,11 +109,11 @@ impl Metric {
         let diagonal = self.m.len() == n;
         let limit = LARGEST_STEP * self.m.iter().fold(0.0, |most: f64, m| most.max(m.abs()));
         if diagonal {
-            for a in 0..n {
+            for (a, d) in d_next.iter_mut().enumerate() {
                 let derivatives = self.along_diagonal(a, by, rules.gamma);
-                self.step(next, a, derivatives, limit, by, rules);
+                self.step(next, a, derivatives, by, (limit, rules));
                 bound(&mut next.m[a], true, rules);
-                d_next[a] = next.m[a] * next.m[a];
+                *d = next.m[a] * next.m[a];
             }
             return;
         }
@@ -121,13 +121,13 @@ impl Metric {
             let row = &self.m[a * n..][..n];
             let mut reach = 0.0;
             let mut square = 0.0;
-            for i in a..n {
-                reach += by.offset[i] * row[i];
-                square += row[i] * row[i];
+            for (m, offset) in row.iter().zip(by.offset).skip(a) {
+                reach += offset * m;
+                square += m * m;
             }
             for b in a..n {
                 let derivatives = self.along_entry((a, b), (reach, square), by, rules.gamma);
-                self.step(next, a * n + b, derivatives, limit, by, rules);
+                self.step(next, a * n + b, derivatives, by, (limit, rules));
                 bound(&mut next.m[a * n + b], a == b, rules);
             }
         }
@@ -145,7 +145,7 @@ impl Metric {
         }
     }
 
-    /// The derivatives along M_ab, given Σ_{i≥a} d_i M_ai and Σ_{i≥a} M_ai².
+    /// The derivatives along `M_ab`, given `Σ_{i≥a} d_i M_ai` and `Σ_{i≥a} M_ai²`.
     fn along_entry(
         &self,
         (a, b): (usize, usize),
@@ -174,9 +174,8 @@ impl Metric {
         next: &mut Self,
         at: usize,
         along: Derivatives,
-        limit: f64,
         by: &Descent<'_>,
-        rules: &Rules,
+        (limit, rules): (f64, &Rules),
     ) {
         let Cost { j1_slope, j1_curvature, share, transient } = by.cost;
         let gradient = j1_slope * along.w + share * along.j2;
@@ -215,7 +214,7 @@ fn bound(m: &mut f64, on_diagonal: bool, rules: &Rules) {
     }
 }
 
-/// D = MᵀM of an upper triangular M.
+/// `D = MᵀM` of an upper triangular M.
 pub fn gram(m: &[f64], d: &mut [f64], n: usize) {
     for a in 0..n {
         for b in a..n {

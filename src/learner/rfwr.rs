@@ -18,11 +18,11 @@
 //! For every field with w > `cutoff`:
 //! 1. **Means.** x̄, its variance and b₀ move towards the sample, with forgetting λ.
 //! 2. **Regression** by recursive least squares on x − x̄ and y − b₀:
-//!    P ← (P − P x xᵀP / (λ/w + xᵀP x)) / λ,  B ← B + w P x e_cvᵀ,
-//!    where e_cv is the error before, and e the error after the sample.
-//! 3. **Metric.** D = MᵀM descends the gradient of the leave-one-out error within the field
-//!    plus a penalty on narrowness, J = Σ w|e_cv|²/W + γ Σ D²: fields are wide where the
-//!    function is straight and narrow where it bends. See [`metric`](super::metric).
+//!    `P ← (P − P x xᵀP / (λ/w + xᵀP x)) / λ`, `B ← B + w P x e_cvᵀ`,
+//!    where `e_cv` is the error before, and e the error after the sample.
+//! 3. **Metric.** `D = MᵀM` descends the gradient of the leave-one-out error within the field
+//!    plus a penalty on narrowness, `J = Σ w|e_cv|²/W + γ Σ D²`: fields are wide where the
+//!    function is straight and narrow where it bends.
 //!
 //! Then **growth**: where no field's activation exceeds `w_gen`, one is added with its
 //! centre at x, shaped like the nearest one if that is near at all; and where two exceed
@@ -202,8 +202,8 @@ impl Rfwr {
             if w <= self.settings.cutoff {
                 continue;
             }
-            let place = Place { index, shapes: &mut self.shapes };
-            shop.teach(field, place, shop.window.derivatives(w).times(weight), &self.settings);
+            let mut place = Place { index, shapes: &mut self.shapes };
+            shop.teach(field, &mut place, shop.window.derivatives(w).times(weight), &self.settings);
             if field.regression.trustworthy && shop.found.y.iter().all(|y| y.is_finite()) {
                 voices += w;
                 for (sum, y) in shop.blend.iter_mut().zip(&shop.found.y) {
@@ -339,7 +339,7 @@ impl Workshop {
     fn teach(
         &mut self,
         field: &mut Field,
-        place: Place<'_>,
+        place: &mut Place<'_>,
         activation: Activation,
         settings: &Settings,
     ) {

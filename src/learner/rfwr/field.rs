@@ -56,7 +56,7 @@ pub struct Regression {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
-    /// The remembered sum of w|e_cv|², the errors before learning a sample.
+    /// The remembered sum of `w|e_cv|²`, the errors before learning a sample.
     pub sum_e_cv2: f64,
     /// The remembered sum of w|e|², the errors after it.
     pub sum_e2: f64,
@@ -200,8 +200,8 @@ impl Regression {
         self.shrink_p(next, w, found);
         for k in 0..found.yz.len() {
             let slopes = &mut next.slopes[k * n..][..n];
-            for i in 0..n {
-                slopes[i] = self.slopes[k * n + i] + w * found.v[i] * found.e_cv[k];
+            for (i, slope) in slopes.iter_mut().enumerate() {
+                *slope = self.slopes[k * n + i] + w * found.v[i] * found.e_cv[k];
             }
             let fitted = dot(slopes, &found.xz);
             found.e[k] = found.yz[k] - fitted;
@@ -311,10 +311,10 @@ impl Errors {
         };
 
         let room = rules.min_one_minus_h.map_or(1.0 - h, |least| (1.0 - h).max(least));
-        for k in 0..e_cv.len() {
-            let gain = w / room * transient * e_cv[k];
-            for i in 0..n {
-                next.h[k * n + i] = lambda * self.h[k * n + i] + gain * xz[i];
+        for (k, e_cv) in e_cv.iter().enumerate() {
+            let gain = w / room * transient * e_cv;
+            for (i, xz) in xz.iter().enumerate() {
+                next.h[k * n + i] = lambda * self.h[k * n + i] + gain * xz;
             }
         }
         let gain = w * w * e_cv2 / room * transient;
