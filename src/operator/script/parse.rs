@@ -26,9 +26,9 @@ pub(super) fn tables(
     };
     let mut builder = Builder { tables: Tables::new(), phases, faults };
     if is_ron {
-        builder.read_ron(text)
+        builder.read_ron(text);
     } else {
-        builder.read_csv(text)
+        builder.read_csv(text);
     }
     builder.tables
 }
@@ -58,6 +58,7 @@ struct Builder<'a> {
     faults: &'a mut Faults,
 }
 
+#[expect(clippy::option_option, reason = "outer: could be read; inner: serves one, not all")]
 impl Builder<'_> {
     fn read_ron(&mut self, text: &str) {
         let rows: Vec<&RawValue> = match ron::from_str(text) {
