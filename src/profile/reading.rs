@@ -12,7 +12,7 @@ use super::document::{Document, Set};
 use super::edit;
 use super::experiment::{Experiment, Reader};
 use super::layout::Profile;
-use super::report::{Fault, Place, Report, clip};
+use super::report::{Fault, MOST_SHOWN, Place, Report, clip};
 use super::ron_options;
 use super::scan::{self, Entry, line_of};
 use crate::check::{self, Check, Checker};
@@ -63,18 +63,18 @@ impl Keys {
     }
 
     /// The value of a `--set` as RON: as given, or else put into quotes.
-    pub fn settle(&self, set: &Set) -> Result<String, Fault> {
+    pub fn settle(&self, set: &Set) -> Result<String, Box<Fault>> {
         let Set { key, value } = set;
         if self.is_section(key) {
             let message = format!("`{}` is a section, not a key", clip(key));
             let some = self.paths().find(|path| path.starts_with(&format!("{key}.")));
             let expected = format!("set one of its keys, such as {}", some.unwrap_or(key));
-            return Err(set.fault(true, message, expected, None));
+            return Err(Box::new(set.fault(true, message, expected, None)));
         }
         if self.default(key).is_none() {
-            return Err(self.unknown(key, |message, help| {
+            return Err(Box::new(self.unknown(key, |message, help| {
                 set.fault(true, message, "no such key".to_owned(), help)
-            }));
+            })));
         }
         let quoted = ron_options().to_string(value).unwrap_or_default();
         let plain = if scan::is_one_value(value) {
@@ -88,9 +88,20 @@ impl Keys {
             Err(error) => {
                 let (expected, help) = self.expected(key, &error);
                 let message = format!("`{key}` cannot be {}", or_nothing(value));
-                Err(set.fault(false, message, expected, help))
+                Err(Box::new(set.fault(false, message, expected, help)))
             }
         }
+    }
+
+    /// What is wrong with the value of `entry`, whose key is known.
+    fn misfit(&self, entry: &Entry, source: &str) -> Option<Fault> {
+        let key = &entry.path;
+        let value = source.get(entry.value.clone()).unwrap_or_default();
+        let error = self.read_alone(key, value).err()?;
+        let (expected, help) = self.expected(key, &error);
+        let message = format!("`{key}` cannot be {}", or_nothing(value));
+        let place = Place::Text(entry.value.clone());
+        Some(Fault { key: key.clone(), message, expected, help, place })
     }
 
     fn unknown(&self, key: &str, fault: impl FnOnce(String, Option<String>) -> Fault) -> Fault {
@@ -121,12 +132,15 @@ impl Keys {
     /// What should stand in place of a value that was refused with `error`.
     fn expected(&self, key: &str, error: &Error) -> (String, Option<String>) {
         let example = self.default(key).unwrap_or("()");
-        let such_as = |what: &str| (format!("expected {what}, such as {}", clip(example)), None);
+        let such_as = |what: &str| match example {
+            "None" => (format!("expected {what}, or None"), None),
+            _ => (format!("expected {what}, such as {}", clip(example)), None),
+        };
         match error {
             Error::ExpectedFloat => such_as("a number"),
             Error::ExpectedInteger
             | Error::IntegerOutOfBounds
-            | Error::InvalidIntegerDigit { .. } => such_as("a whole number"),
+            | Error::InvalidIntegerDigit { .. } => such_as("a whole number of 0 or more"),
             Error::ExpectedBoolean => ("expected true or false".to_owned(), None),
             Error::ExpectedString => ("expected a text in \"quotes\"".to_owned(), None),
             Error::ExpectedArray => such_as("a list in [brackets]"),
@@ -178,7 +192,7 @@ pub(super) fn read(document: &Document) -> Result<Profile, Report> {
     let source = document.source();
     let entries =
         scan::entries(source).map_err(|broken| report(vec![broken_fault(source, broken)]))?;
-    let keys = keys_of(document, &entries).map_err(|fault| report(vec![fault]))?;
+    let keys = keys_of(document, &entries).map_err(|fault| report(vec![*fault]))?;
 
     let mut faults = Vec::new();
     let mut text = source.to_owned();
@@ -189,12 +203,13 @@ pub(super) fn read(document: &Document) -> Result<Profile, Report> {
     for set in document.sets() {
         match keys.settle(set) {
             Ok(value) => text = edit::put(&text, &set.key, &value).unwrap_or(text),
-            Err(fault) => faults.push(fault),
+            Err(fault) => faults.push(*fault),
         }
     }
     match (keys.reader)(&text) {
         Ok(profile) => {
             faults.extend(faults_of_ranges(&profile, document, &entries));
+            faults.sort_by_key(|fault| fault.place.order());
             if faults.is_empty() { Ok(profile) } else { Err(report(faults)) }
         }
         Err(_) if !faults.is_empty() => Err(report(faults)),
@@ -203,7 +218,7 @@ pub(super) fn read(document: &Document) -> Result<Profile, Report> {
 }
 
 /// The keys of the task that `document` names.
-pub(super) fn keys_of(document: &Document, entries: &[Entry]) -> Result<Keys, Fault> {
+pub(super) fn keys_of(document: &Document, entries: &[Entry]) -> Result<Keys, Box<Fault>> {
     const KEY: &str = "task";
     let tasks = Experiment::NAMES.join(", ");
     let expected = format!("expected one of {tasks}");
@@ -221,24 +236,24 @@ pub(super) fn keys_of(document: &Document, entries: &[Entry]) -> Result<Keys, Fa
         let name = set.value.trim().trim_matches('"');
         return Keys::of(name).ok_or_else(|| {
             let message = format!("unknown task `{}`", clip(name));
-            Fault { place: set.place(false), ..fault(message, help(name), Place::Default) }
+            Box::new(fault(message, help(name), set.place(false)))
         });
     }
     let source = document.source();
     let Some(entry) = entries.iter().find(|entry| entry.path == KEY) else {
         let open = source.find('(').unwrap_or(0);
         let place = Place::Text(open..open + 1);
-        return Err(fault("the profile names no task".to_owned(), None, place));
+        return Err(Box::new(fault("the profile names no task".to_owned(), None, place)));
     };
     let value = source.get(entry.value.clone()).unwrap_or_default();
     let name = ron_options().from_str::<String>(value);
     let known = name.as_deref().ok().and_then(Keys::of);
     known.ok_or_else(|| {
         let place = Place::Text(entry.value.clone());
-        match name {
+        Box::new(match name {
             Ok(name) => fault(format!("unknown task {:?}", clip(&name)), help(&name), place),
             Err(_) => fault(format!("`task` is {}", clip(value)), None, place),
-        }
+        })
     })
 }
 
@@ -249,7 +264,9 @@ fn faults_of_entries<'a>(
     keys: &Keys,
 ) -> Vec<(&'a Entry, Fault)> {
     let mut faults = Vec::new();
-    let mut seen: HashMap<&str, usize> = HashMap::new();
+    // Where each key was first seen, and in which line.
+    let mut seen: HashMap<&str, (usize, usize)> = HashMap::new();
+    let (mut line, mut counted) = (1, 0);
     let mut judged = 0;
     for entry in entries {
         // What lies within a bad or indivisible entry was judged with it.
@@ -257,24 +274,27 @@ fn faults_of_entries<'a>(
             continue;
         }
         let at = |range: &std::ops::Range<usize>| Place::Text(range.clone());
-        let first = *seen.entry(&entry.path).or_insert(entry.key.start);
+        line += line_of(source.get(counted..entry.key.start).unwrap_or_default(), usize::MAX) - 1;
+        counted = entry.key.start;
+        let (first, first_line) = *seen.entry(&entry.path).or_insert((counted, line));
         let fault = if first != entry.key.start {
             Some(Fault {
                 key: entry.path.clone(),
                 message: format!("`{}` is given twice", clip(&entry.path)),
-                expected: format!("first given in line {}", line_of(source, first)),
+                expected: format!("first given in line {first_line}"),
                 help: Some("remove one of the two".to_owned()),
                 place: at(&entry.key),
             })
         } else if keys.is_section(&entry.path) && entry.is_section {
             continue;
         } else if keys.is_section(&entry.path) || keys.default(&entry.path).is_some() {
-            let value = source.get(entry.value.clone()).unwrap_or_default();
-            keys.read_alone(&entry.path, value).err().map(|error| {
-                let (expected, help) = keys.expected(&entry.path, &error);
-                let message = format!("`{}` cannot be {}", entry.path, or_nothing(value));
-                Fault { key: entry.path.clone(), message, expected, help, place: at(&entry.value) }
-            })
+            keys.misfit(entry, source)
+        } else if faults.len() > MOST_SHOWN {
+            // Nobody reads this far: spare the search for what was meant.
+            let message = format!("unknown key `{}`", clip(&entry.path));
+            let expected = "no such key".to_owned();
+            let place = at(&entry.key);
+            Some(Fault { key: entry.path.clone(), message, expected, help: None, place })
         } else {
             Some(keys.unknown(&entry.path, |message, help| Fault {
                 key: entry.path.clone(),

@@ -8,7 +8,7 @@ use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use super::scan::line_of;
 
 /// Faults beyond this many are counted, not shown.
-const MOST_SHOWN: usize = 40;
+pub(super) const MOST_SHOWN: usize = 40;
 
 /// Where a fault comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,6 +24,17 @@ pub(super) enum Place {
     },
     /// A default that does not go with the other values.
     Default,
+}
+
+impl Place {
+    /// The text's faults in its order, then those of `--set`s, then those of defaults.
+    pub(super) fn order(&self) -> (u8, usize) {
+        match self {
+            Self::Text(at) => (0, at.start),
+            Self::Set { .. } => (1, 0),
+            Self::Default => (2, 0),
+        }
+    }
 }
 
 /// One thing that is wrong.
@@ -49,7 +60,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// The faults, in the order of the text.
+    /// The faults: those of the text in its order, then those of `--set`s.
     #[must_use]
     pub fn faults(&self) -> &[Fault] {
         &self.faults
@@ -60,19 +71,17 @@ impl Report {
     #[must_use]
     pub fn render(&self, colour: bool) -> String {
         let renderer = if colour { Renderer::styled() } else { Renderer::plain() };
-        let mut message = String::new();
-        for fault in self.faults.iter().take(MOST_SHOWN) {
-            message.push_str(&self.render_one(fault, &renderer));
-            message.push_str("\n\n");
-        }
+        let shown = self.faults.iter().take(MOST_SHOWN);
+        let mut parts: Vec<String> =
+            shown.map(|fault| self.render_one(fault, &renderer) + "\n").collect();
         let hidden = self.faults.len().saturating_sub(MOST_SHOWN);
         if hidden > 0 {
-            message.push_str(&format!("… and {hidden} more\n"));
+            parts.push(format!("… and {hidden} more"));
         }
         let count = self.faults.len();
         let word = if count == 1 { "fault" } else { "faults" };
-        message.push_str(&format!("{count} {word} in {}; nothing was started", self.shown));
-        message
+        parts.push(format!("{count} {word} in {}; nothing was started", self.shown));
+        parts.join("\n")
     }
 
     fn render_one(&self, fault: &Fault, renderer: &Renderer) -> String {
