@@ -1,165 +1,24 @@
 //! What is kept of a session outlives kills, full disks and a second process.
 
-use std::fs;
-use std::path::Path;
+#![expect(clippy::unwrap_used, reason = "helpers of tests may fail like tests")]
 
+#[path = "record/samples.rs"]
+mod samples;
+
+use std::fs;
+
+use coadapt::random::{Place, Purpose, stream};
 use coadapt::record::folder::{self, Unfinished};
-use coadapt::record::sidecar::Host;
 use coadapt::record::{
-    Checkpoint, EpisodeRow, Error, EvaluationRow, EventRow, Folder, Manner, Policy, Recorder,
-    Sidecar, Status, StepRow, VERSION, assignment, reader,
+    Error, EvaluationRow, EventRow, Folder, Manner, Recorder, Sidecar, Status, StepRow, assignment,
+    reader,
 };
 use coadapt::record::{policy, read_policy, read_sidecar};
-use coadapt::session::{Moment, Phase, Subject, Trial};
+use coadapt::session::{Phase, Subject, Trial};
 use coadapt::sharing::Mode;
 use coadapt::signal::{End, State};
 use proptest::prelude::*;
-use serde::{Deserialize, Serialize};
-
-const COLUMNS: [&str; 4] = ["x", "x_dot", "theta", "theta_dot"];
-
-/// A learner as the program stores them: an enum with a tag.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "learner", rename_all = "snake_case")]
-enum Model {
-    Memory { beta: Vec<f64> },
-}
-
-fn model(number: f64) -> Model {
-    Model::Memory { beta: vec![number, -0.0, 5e-324, 0.1 + 0.2] }
-}
-
-fn subject() -> Subject {
-    "S07".parse().unwrap()
-}
-
-fn sidecar(trial: Trial) -> Sidecar {
-    Sidecar {
-        version: VERSION.to_owned(),
-        task: "balance".to_owned(),
-        preset: "balance".to_owned(),
-        mode: Mode::Simultaneous,
-        assigned: false,
-        learner: "rfwr".to_owned(),
-        operator: "none".to_owned(),
-        backend: "simulated".to_owned(),
-        subject: subject(),
-        trial,
-        seed: 1,
-        status: Status::Running,
-        started: String::new(),
-        ended: None,
-        key_releases: None,
-        devices: Vec::new(),
-        host: Host::default(),
-        timing: None,
-        planned: Phase::ALL.to_vec(),
-        profile_ron: "(task: balance)".to_owned(),
-        profile: serde_json::json!({ "task": "balance" }),
-        phases: std::collections::BTreeMap::new(),
-        resumed: Vec::new(),
-    }
-}
-
-fn step(episode: u32, step: u32) -> StepRow {
-    let t = f64::from(step) * 0.02;
-    StepRow {
-        phase: Phase::Main,
-        episode,
-        step,
-        t,
-        state: State::new([t.sin(), 1e-300, -0.0, 1.0 / 3.0]),
-        u_human: Some(10.0),
-        u_machine: None,
-        share: Some(1.0),
-        u: Some(10.0),
-        u_applied: Some(1e22),
-        reward: Some(0.1 + 0.2),
-        success: Some(0.0),
-        region: Some("all"),
-        lateness_us: 0,
-    }
-}
-
-fn episode(number: u32) -> EpisodeRow {
-    EpisodeRow {
-        phase: Phase::Main,
-        episode: number,
-        start: 0.05,
-        steps: 3,
-        duration_s: 0.06,
-        end: End::Failed,
-        total: 1.5,
-        mean_reward: 0.5,
-        share: Some(1.0),
-        success: None,
-        receptive_fields: Some(7),
-    }
-}
-
-fn checkpoint(rollout: u32) -> Box<Checkpoint<Model>> {
-    Box::new(Checkpoint {
-        version: VERSION.to_owned(),
-        moment: Moment { rollout, ..Moment::start_of(Phase::Main) },
-        of: Some(3),
-        learner: Some(model(f64::from(rollout) / 7.0)),
-        sharing: None,
-        learned: 3,
-        refused: 0,
-        practice: rollout,
-        tenths: 0,
-        steps_bytes: 0,
-        episodes_bytes: 0,
-    })
-}
-
-fn a_policy(learner: Model) -> Policy<Model> {
-    Policy {
-        version: VERSION.to_owned(),
-        task: "balance".to_owned(),
-        preset: "balance".to_owned(),
-        mode: Mode::Sequential,
-        subject: subject(),
-        trial: Trial(3),
-        percent: 100,
-        features: COLUMNS.map(str::to_owned).to_vec(),
-        action_limit: 10.0,
-        learner,
-    }
-}
-
-fn start(logs: &Path, manner: Manner) -> (Recorder<Model>, Trial) {
-    let created = Folder::create(logs, &subject(), None, "balance", "simultaneous").unwrap();
-    let recorder = Recorder::start(created.folder, &COLUMNS, manner, &sidecar(created.trial));
-    (recorder.unwrap(), created.trial)
-}
-
-/// Records the rollouts, each with three steps and followed by a checkpoint.
-fn rollouts(recorder: &mut Recorder<Model>, numbers: std::ops::RangeInclusive<u32>) {
-    for number in numbers {
-        for k in 0..3 {
-            recorder.step(step(number, k));
-        }
-        recorder.episode(episode(number));
-        recorder.checkpoint(checkpoint(number + 1));
-    }
-}
-
-fn complete(trial: Trial) -> Sidecar {
-    Sidecar { status: Status::Complete, ..sidecar(trial) }
-}
-
-fn read(folder: &Path, name: &str) -> String {
-    fs::read_to_string(folder.join(name)).unwrap()
-}
-
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap() {
-        let path = entry.unwrap().path();
-        fs::copy(&path, to.join(path.file_name().unwrap())).unwrap();
-    }
-}
+use samples::*;
 
 #[test]
 fn a_session_leaves_the_files_with_the_promised_columns() {
@@ -279,7 +138,7 @@ fn a_table_cut_at_any_byte_yields_all_its_whole_rows() {
         let whole = fs::read(path.join(name)).unwrap();
         for length in 0..=whole.len() {
             fs::write(&cut, &whole[..length]).unwrap();
-            let lines = whole[..length].iter().filter(|byte| **byte == b'\n').count();
+            let lines = String::from_utf8_lossy(&whole[..length]).matches('\n').count();
             let rows = if name == "steps.csv" {
                 reader::Steps::open(&cut).unwrap().map(Result::unwrap).count()
             } else {
@@ -326,8 +185,7 @@ fn a_killed_session_resumes_to_the_same_bytes_wherever_it_was_cut() {
     let (mut recorder, _) = start(logs.path(), Manner::Live);
     let path = recorder.path().to_owned();
     rollouts(&mut recorder, 1..=2);
-    let dropped = [step(3, 0), step(3, 1)];
-    dropped.into_iter().for_each(|row| recorder.step(row));
+    recorder.step(step(3, 0));
     drop(recorder);
     let steps = fs::read(path.join("steps.csv")).unwrap();
     let kept = steps.iter().enumerate().filter(|(_, b)| **b == b'\n').nth(6).unwrap().0 + 1;
@@ -360,6 +218,7 @@ fn a_killed_session_resumes_to_the_same_bytes_wherever_it_was_cut() {
 
 #[test]
 fn a_damaged_session_is_refused_and_left_untouched() {
+    type Damage<'a> = &'a dyn Fn(&str) -> String;
     let logs = tempfile::tempdir().unwrap();
     let (mut recorder, _) = start(logs.path(), Manner::Live);
     let path = recorder.path().to_owned();
@@ -368,7 +227,7 @@ fn a_damaged_session_is_refused_and_left_untouched() {
     drop(recorder);
     let newer = |text: &str| text.replacen("\"schema\":1", "\"schema\":2", 1);
     let cut = |text: &str| text[..text.len() / 2].to_owned();
-    let cases: [(&str, &dyn Fn(&str) -> String, &str); 6] = [
+    let cases: [(&str, Damage<'_>, &str); 6] = [
         ("checkpoint.json", &newer, "written by a newer coadapt"),
         ("checkpoint.json", &cut, "is cut off"),
         ("checkpoint.json", &|_| "not JSON".to_owned(), "not a valid JSON file"),
@@ -557,8 +416,7 @@ fn assigned_modes_are_balanced_over_subjects_who_keep_theirs() {
             .finish(sidecar)
             .unwrap();
     };
-    let chance =
-        || coadapt::random::stream(4, coadapt::random::Purpose::Assignment, Default::default());
+    let chance = || stream(4, Purpose::Assignment, Place::default());
     let draws: Vec<Mode> = {
         let mut chance = chance();
         (0..50).map(|_| assignment::assign(&[], &mut chance)).collect()
