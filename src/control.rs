@@ -2,5 +2,6 @@
 
 pub mod cycle;
 mod effects;
+pub mod scribe;
 pub mod snapshot;
 pub mod witness;

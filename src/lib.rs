@@ -2,6 +2,7 @@
 
 pub mod backend;
 pub mod check;
+pub mod cli;
 pub mod clock;
 pub mod control;
 pub mod learner;
@@ -11,9 +12,11 @@ pub mod profile;
 pub mod random;
 pub mod record;
 pub mod report;
+pub mod run;
 
 pub mod session;
 pub mod sharing;
 pub mod signal;
+pub mod study;
 pub mod task;
 pub mod teaching;

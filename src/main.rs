@@ -1,3 +1,7 @@
 //! The doorbell: everything else is the library.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    coadapt::run::run()
+}

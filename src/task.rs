@@ -19,8 +19,8 @@ pub trait Task: Send + Sync {
     /// What the learner sees of a state.
     fn features(&self, state: &State) -> Features;
 
-    /// The number of features.
-    fn feature_count(&self) -> usize;
+    /// The names of the features, in order.
+    fn feature_names(&self) -> &'static [&'static str];
 
     /// A start drawn at random.
     fn random_start(&self, chance: &mut ChaCha8Rng) -> State;

@@ -23,7 +23,7 @@ use crate::task::Task;
 use crate::teaching;
 
 /// Who and what takes part.
-pub struct Crew {
+pub struct Crew<W> {
     /// What the plant is used for.
     pub task: Box<dyn Task>,
     /// The plant, within its limits.
@@ -31,7 +31,7 @@ pub struct Crew {
     /// Who steers.
     pub operator: Box<dyn Operator>,
     /// Who writes it down.
-    pub witness: Box<dyn Witness>,
+    pub witness: W,
     /// Who may look and ask; nobody in an evaluation.
     pub publisher: Option<Publisher>,
 }
@@ -54,8 +54,8 @@ pub struct Rules {
 }
 
 /// What a session led to.
-#[derive(Clone, Debug)]
-pub struct Outcome {
+#[derive(Debug)]
+pub struct Outcome<W> {
     /// How it finished.
     pub finish: Finish,
     /// Why it was ended early.
@@ -74,8 +74,8 @@ pub struct Outcome {
     pub lateness_us: Option<Histogram<u64>>,
     /// Ticks left out.
     pub missed: u64,
-    /// Why writing failed, if it did.
-    pub fault: Option<String>,
+    /// Who wrote it down.
+    pub witness: W,
 }
 
 /// The learner, the shares and their counts: what a discard restores.
@@ -96,9 +96,9 @@ pub(super) struct Rollout {
 }
 
 /// A session under way.
-pub struct Cycle {
+pub struct Cycle<W> {
     pub(super) rules: Rules,
-    pub(super) crew: Crew,
+    pub(super) crew: Crew<W>,
     pub(super) stage: Stage,
     pub(super) mind: Mind,
     pub(super) before_rollout: Option<Mind>,
@@ -111,14 +111,19 @@ pub struct Cycle {
     lateness_us: Option<Histogram<u64>>,
 }
 
-impl Cycle {
-    /// A session from its beginning, or from where it stood. `learner` is what an
-    /// autonomous phase without a main phase uses.
+impl<W: Witness> Cycle<W> {
+    /// A session from its beginning, or from where it stood after the rollouts `earlier`.
+    /// `learner` is what an autonomous phase without a main phase uses.
     #[must_use]
-    pub fn new(rules: Rules, crew: Crew, learner: Model, from: Option<Standing>) -> Self {
+    pub fn new(
+        rules: Rules,
+        crew: Crew<W>,
+        learner: Model,
+        from: Option<(Standing, Vec<EpisodeRow>)>,
+    ) -> Self {
         let sharing = Sharing::new(&rules.sharing, rules.mode, crew.task.regions());
         let mind = Mind { learner, sharing, learned: 0, refused: 0 };
-        let moment = from.as_ref().map(|standing| standing.moment);
+        let moment = from.as_ref().map(|(standing, _)| standing.moment);
         let (stage, effects) = machine::begin(&rules.plan, moment);
         let mut cycle = Self {
             rules,
@@ -135,11 +140,13 @@ impl Cycle {
             lateness_us: Histogram::new_with_max(60_000_000, 3).ok(),
         };
         let is_new = from.is_none();
-        if let Some(standing) = from {
+        if let Some((standing, earlier)) = from {
             cycle.recall(standing);
+            cycle.show_earlier(earlier);
         }
         cycle.carry_out(&effects);
         if is_new {
+            cycle.store_given_policy();
             cycle.store_standing();
         }
         cycle
@@ -156,9 +163,16 @@ impl Cycle {
         self.tenths = standing.tenths;
     }
 
+    fn show_earlier(&mut self, earlier: Vec<EpisodeRow>) {
+        if let Some(publisher) = &self.crew.publisher {
+            earlier.iter().for_each(|row| publisher.rollout(*row));
+        }
+        self.episodes = earlier;
+    }
+
     /// Runs the session to its end.
     #[must_use]
-    pub fn run(mut self, clock: &mut dyn Clock) -> Outcome {
+    pub fn run(mut self, clock: &mut dyn Clock) -> Outcome<W> {
         let mut pacer = Pacer::new(clock);
         while !matches!(self.stage, Stage::Finished(_)) {
             let speed = self.speed();
@@ -390,7 +404,7 @@ impl Cycle {
         publisher.publish(&self.seen);
     }
 
-    fn into_outcome(mut self) -> Outcome {
+    fn into_outcome(mut self) -> Outcome<W> {
         self.crew.backend.halt();
         self.publish();
         let finish = match self.stage {
@@ -407,7 +421,7 @@ impl Cycle {
             refused: self.mind.refused,
             lateness_us: self.lateness_us,
             missed: self.seen.missed,
-            fault: self.crew.witness.fault(),
+            witness: self.crew.witness,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What the cycle does about a transition of the session.
 
 use super::cycle::{Cycle, Mind, Rollout};
-use super::witness::{Happening, Standing};
+use super::witness::{Happening, Standing, Witness};
 use crate::backend::Backend;
 use crate::learner::Learner;
 use crate::record::{EpisodeRow, StepRow};
@@ -11,7 +11,7 @@ use crate::session::{Moment, Phase};
 use crate::sharing::Sharing;
 use crate::signal::End;
 
-impl Cycle {
+impl<W: Witness> Cycle<W> {
     /// Lets `event` happen to the session, and carries out what follows.
     pub(super) fn happen(&mut self, event: Event) {
         let before = self.stage;
@@ -168,6 +168,14 @@ impl Cycle {
         while self.tenths < over {
             self.tenths += 1;
             self.crew.witness.policy(Some(self.tenths * 10), &self.mind.learner);
+        }
+    }
+
+    /// A session that teaches no policy keeps the one it was given.
+    pub(super) fn store_given_policy(&mut self) {
+        let plan = &self.rules.plan;
+        if plan.phase(Phase::Main).is_none() && plan.phase(Phase::Autonomous).is_some() {
+            self.crew.witness.policy(None, &self.mind.learner);
         }
     }
 

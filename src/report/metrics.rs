@@ -202,7 +202,9 @@ impl Phases {
 }
 
 impl Measures {
-    fn sentence(&self) -> String {
+    /// The measures in a sentence.
+    #[must_use]
+    pub fn sentence(&self) -> String {
         let spread = self.sd_balance_s.map_or(String::new(), |sd| format!(" ± {sd:.2}"));
         format!("{:.2}{spread} s balanced over {} rollouts", self.mean_balance_s, self.episodes)
     }

@@ -98,8 +98,9 @@ impl Task for Balance {
         Features::from_slice(state).unwrap_or_default()
     }
 
-    fn feature_count(&self) -> usize {
-        CartPole::COLUMNS.len()
+    /// The state itself: θ is continuous as far as balancing goes (3.2.1).
+    fn feature_names(&self) -> &'static [&'static str] {
+        &CartPole::COLUMNS
     }
 
     fn random_start(&self, chance: &mut ChaCha8Rng) -> State {

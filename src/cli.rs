@@ -1,0 +1,207 @@
+//! The words of the command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::profile::Order;
+use crate::session::Subject;
+
+const EXAMPLES: &str = "\
+Examples:
+  coadapt                                       set up a session on the screen
+  coadapt run balance --subject S07             one session, you at the keyboard
+  coadapt run balance --headless --operator simulated:average --seed 1 --json
+  coadapt run --headless --resume logs/S07/001-balance-simultaneous
+  coadapt profile show balance                  every key, its value and its origin
+
+Results go to standard output, messages to standard error.
+Exit codes: 0 done, 1 failed, 2 wrong usage or input, 130 interrupted, 143 terminated.";
+
+/// The terminal laboratory for simultaneous human-robot learning.
+///
+/// Without a command it opens the set-up screen; Enter plays at once.
+#[derive(Debug, Parser)]
+#[command(version, after_help = EXAMPLES)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// One session: introduction, main, autonomous.
+    Run(Run),
+    /// Let a recorded policy act alone over many starts.
+    Evaluate(Evaluate),
+    /// A plant open loop: a table of actions in, a table of states out.
+    Simulate(Simulate),
+    /// Look at profiles.
+    #[command(subcommand)]
+    Profile(Profile),
+}
+
+/// The words of `run`.
+#[derive(Args, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
+pub struct Run {
+    /// A name in `profiles/` or built in, or a path.
+    #[arg(required_unless_present = "resume")]
+    pub profile: Option<String>,
+    /// Who: 1 to 64 letters, digits, '-' and '_' [default: anon].
+    #[arg(long, value_name = "ID")]
+    pub subject: Option<Subject>,
+    /// The trial's number [default: the next free one].
+    #[arg(long, value_name = "N")]
+    pub trial: Option<u32>,
+    /// simultaneous, sequential or assigned.
+    #[arg(long, value_name = "MODE")]
+    pub mode: Option<String>,
+    /// rfwr.
+    #[arg(long, value_name = "LEARNER")]
+    pub learner: Option<String>,
+    /// keyboard, script:FILE, simulated:naive|average|expert[:TYPE] or none.
+    #[arg(long, value_name = "OPERATOR", default_value = "keyboard")]
+    pub operator: String,
+    /// simulated.
+    #[arg(long, value_name = "BACKEND", default_value = "simulated")]
+    pub backend: String,
+    /// Some of introduction,main,autonomous.
+    #[arg(long, value_name = "A,B")]
+    pub phases: Option<String>,
+    /// Rollouts of the main phase.
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub rollouts: Option<String>,
+    /// Controlled time of the main phase, s.
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    pub duration: Option<String>,
+    /// What the robot does in a session without a main phase: a file, or `last`.
+    #[arg(long, value_name = "FILE|last")]
+    pub policy: Option<String>,
+    /// Go on with a session that was cut.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["profile", "subject", "trial", "mode",
+        "learner", "phases", "rollouts", "duration", "policy", "seed", "set"])]
+    pub resume: Option<PathBuf>,
+    /// The seed of everything left to chance [default: drawn and stored].
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Change a value of the profile, such as plant.pole_length_m=0.6.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
+    /// The folder of all sessions.
+    #[arg(long, value_name = "DIR", default_value = "logs")]
+    pub logs: PathBuf,
+    /// No screen, as fast as the machine goes.
+    #[arg(long)]
+    pub headless: bool,
+    /// Print one JSON object instead of sentences.
+    #[arg(long, requires = "headless")]
+    pub json: bool,
+}
+
+/// The words of `evaluate`.
+#[derive(Args, Debug)]
+pub struct Evaluate {
+    /// A policy file, or the folder of a session, whose final policy it is then.
+    pub policy: PathBuf,
+    /// The profile whose plant and rules apply [default: the session's, or the task's].
+    #[arg(long, value_name = "PROFILE")]
+    pub profile: Option<String>,
+    /// The number of starts, on a grid [default: the profile's].
+    #[arg(long, value_name = "N")]
+    pub starts: Option<u32>,
+    /// The seed of the plant's noise.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Print one JSON object instead of sentences.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The words of `simulate`.
+#[derive(Args, Debug)]
+pub struct Simulate {
+    /// A name in `profiles/` or built in, or a path.
+    pub profile: String,
+    /// The state to start from, such as 0,0,0.05,0.
+    #[arg(long, value_name = "X,…", allow_hyphen_values = true)]
+    pub start: String,
+    /// A CSV table with the column `u`, a row a control step; `-` for standard input.
+    #[arg(long, value_name = "FILE")]
+    pub actions: PathBuf,
+    /// The seed of the plant's noise.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Change a value of the profile, such as plant.pole_length_m=0.6.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
+}
+
+/// The words of `profile`.
+#[derive(Debug, Subcommand)]
+pub enum Profile {
+    /// The profiles that can be run by name.
+    List,
+    /// Every key with its value and where the value comes from.
+    Show(Looked),
+    /// Tell all that is wrong with a profile.
+    Check(Looked),
+}
+
+/// Which profile to look at.
+#[derive(Args, Debug)]
+pub struct Looked {
+    /// A name in `profiles/` or built in, or a path.
+    pub profile: String,
+    /// Change a value of the profile, such as plant.pole_length_m=0.6.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
+}
+
+fn key_value(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => {
+            Ok((key.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err("give KEY=VALUE, such as plant.pole_length_m=0.6".to_owned()),
+    }
+}
+
+impl Run {
+    /// The session that these words ask for.
+    #[must_use]
+    pub fn order(&self) -> Order {
+        let mut order = Order {
+            profile: self.profile.clone().unwrap_or_default(),
+            subject: self.subject.clone().unwrap_or_default(),
+            trial: self.trial,
+            operator: self.operator.clone(),
+            policy: self.policy.clone(),
+            seed: self.seed,
+            backend: self.backend.clone(),
+            logs: self.logs.clone(),
+            sets: Vec::new(),
+        };
+        for (key, value) in &self.set {
+            order.change(key, value);
+        }
+        if self.duration.is_some() && self.rollouts.is_none() {
+            order.change("session.main_rollouts", "None");
+        }
+        let phases = self.phases.as_ref().map(|phases| format!("[{phases}]"));
+        for (key, value) in [
+            ("mode", self.mode.as_ref()),
+            ("learner.kind", self.learner.as_ref()),
+            ("session.phases", phases.as_ref()),
+            ("session.main_rollouts", self.rollouts.as_ref()),
+            ("session.main_duration_s", self.duration.as_ref()),
+        ] {
+            if let Some(value) = value {
+                order.change(key, value);
+            }
+        }
+        order
+    }
+}

@@ -1,0 +1,142 @@
+//! The composition root: the one room that knows every other.
+
+pub mod outcome;
+pub mod session;
+mod shutdown;
+mod words;
+
+use std::io::{self, IsTerminal, Write};
+use std::process::ExitCode;
+
+use clap::Parser;
+use clap::error::ErrorKind;
+
+use crate::cli::{Cli, Command};
+use crate::clock::VirtualClock;
+use outcome::Finished;
+use session::{Company, Session};
+use shutdown::Shutdown;
+
+/// Why something was not done.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// Wrong words or a wrong input: exit code 2.
+    #[error("{0}")]
+    Usage(String),
+    /// It went wrong: exit code 1.
+    #[error("{0}")]
+    Failed(String),
+}
+
+/// Does what the command line says and returns the exit code: 0 done, 1 failed, 2 wrong
+/// usage or input, 128 + n ended by signal n.
+#[must_use]
+pub fn run() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are asked for; everything else is wrong usage.
+            let asked = matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
+            let _ = error.print();
+            return ExitCode::from(if asked { 0 } else { 2 });
+        }
+    };
+    match obey(&cli) {
+        Ok(code) => code,
+        Err(error) => {
+            tell(&error.to_string());
+            ExitCode::from(match error {
+                RunError::Usage(_) => 2,
+                RunError::Failed(_) => 1,
+            })
+        }
+    }
+}
+
+fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
+    match &cli.command {
+        None => screen(None),
+        Some(Command::Run(run)) if run.headless => headless(run),
+        Some(Command::Run(run)) => screen(Some(run)),
+        Some(Command::Evaluate(evaluate)) => words::evaluate(evaluate),
+        Some(Command::Simulate(simulate)) => words::simulate(simulate),
+        Some(Command::Profile(profile)) => words::profile(profile),
+    }
+}
+
+fn screen(_run: Option<&crate::cli::Run>) -> Result<ExitCode, RunError> {
+    Err(RunError::Failed("no screen yet".to_owned()))
+}
+
+/// A whole session on virtual time.
+fn headless(run: &crate::cli::Run) -> Result<ExitCode, RunError> {
+    let session = match &run.resume {
+        Some(folder) => Session::resume(folder, Company::Headless)?,
+        None => Session::begin(&run.order(), Company::Headless)?,
+    };
+    for notice in &session.notices {
+        tell(notice);
+    }
+    let shutdown = Shutdown::listen();
+    shutdown.abort_on_signal(session.watcher.clone());
+    let finished = session.run(&mut VirtualClock::default(), || shutdown.signal())?;
+    if run.json {
+        let json = serde_json::to_string(&finished.results)
+            .map_err(|error| RunError::Failed(format!("the results have no JSON: {error}")))?;
+        say(&json)?;
+    } else {
+        say(&sentences(&finished).join("\n"))?;
+    }
+    Ok(exit_code(&finished))
+}
+
+/// What came out, for people.
+fn sentences(finished: &Finished) -> Vec<String> {
+    let mut lines = finished.results.phases.sentences();
+    if !finished.tenths.is_empty() {
+        let tenths: Vec<String> = finished
+            .tenths
+            .iter()
+            .map(|(percent, mean)| format!("{percent} %: {mean:.2} s"))
+            .collect();
+        lines.push(format!("after each tenth  {}", tenths.join(", ")));
+    }
+    if let Some(cause) = &finished.cause {
+        lines.push(format!("ended early: {cause}"));
+    }
+    lines.push(format!("files in {}", finished.folder.display()));
+    lines
+}
+
+fn exit_code(finished: &Finished) -> ExitCode {
+    use crate::record::Status;
+    match (finished.results.status, finished.signal) {
+        (Status::Failed, _) => ExitCode::from(1),
+        (_, Some(signal)) => {
+            ExitCode::from(128_u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
+        }
+        _ => ExitCode::SUCCESS,
+    }
+}
+
+/// A message for a person, on standard error.
+fn tell(message: &str) {
+    let mut out = io::stderr().lock();
+    let _ = writeln!(out, "coadapt: {}", message.trim_end());
+}
+
+/// A result, on standard output.
+fn say(result: &str) -> Result<(), RunError> {
+    let mut out = io::stdout().lock();
+    match writeln!(out, "{result}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(RunError::Failed(format!("cannot write to standard output: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether messages on standard error may be coloured.
+fn wants_colour() -> bool {
+    io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
+}

@@ -1,0 +1,196 @@
+//! What remains to be done after the last tick: evaluation, measures, last files.
+
+use std::path::PathBuf;
+
+use hdrhistogram::Histogram;
+use serde::Serialize;
+
+use super::RunError;
+use crate::clock;
+use crate::control::cycle::Outcome;
+use crate::control::scribe::Scribe;
+use crate::control::witness::Witness as _;
+use crate::learner::Model;
+use crate::profile::Profile;
+use crate::record::sidecar::{Lateness, Timing};
+use crate::record::{EpisodeRow, EvaluationRow, Sidecar, Status};
+use crate::report::metrics::{self, MainEnd, Phases};
+use crate::session::Phase;
+use crate::session::machine::Finish;
+use crate::study::evaluate;
+
+/// The region whose share and success stand for the session; balance has one.
+const REGION: usize = 0;
+
+/// A session that is over.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// What `run --json` prints.
+    pub results: Results,
+    /// Why it ended early.
+    pub cause: Option<String>,
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Its rollouts.
+    pub episodes: Vec<EpisodeRow>,
+    /// The mean balance time of each tenth's policy, by percent.
+    pub tenths: Vec<(u8, f64)>,
+    /// The signal that ended it.
+    pub signal: Option<i32>,
+}
+
+/// The JSON object of a session.
+#[derive(Clone, Debug, Serialize)]
+pub struct Results {
+    schema: u32,
+    session: String,
+    task: String,
+    preset: String,
+    mode: &'static str,
+    learner: String,
+    operator: String,
+    seed: u64,
+    subject: String,
+    trial: u32,
+    /// How it ended.
+    pub status: Status,
+    /// The measures of its phases.
+    pub phases: Phases,
+}
+
+/// Evaluates, measures and writes the last files.
+pub(super) fn conclude(
+    profile: Profile,
+    sidecar: Sidecar,
+    folder: PathBuf,
+    outcome: Outcome<Scribe>,
+    frames: u64,
+    signal: Option<i32>,
+) -> Result<Finished, RunError> {
+    let Outcome { finish, cause, sharing, episodes, learned, refused, .. } = outcome;
+    let fault = outcome.witness.fault();
+    let lost_rows = outcome.witness.lost();
+    let (mut recorder, tenths) = outcome.witness.into_parts();
+    let status = match (finish, &fault, signal) {
+        (Finish::Complete, None, _) => Status::Complete,
+        (_, Some(_), _) => Status::Failed,
+        (Finish::Aborted, None, Some(_)) => Status::Interrupted,
+        (Finish::Aborted, None, None) => Status::Aborted,
+    };
+    let mut means = Vec::new();
+    if finish == Finish::Complete && fault.is_none() && !tenths.is_empty() {
+        let rows = evaluation(&profile, &tenths, sidecar.seed, &episodes);
+        means = tenth_means(&tenths, &rows);
+        recorder.evaluation(rows);
+    }
+    let taught = metrics::rollouts_of(&episodes, Phase::Main).next().is_some();
+    let main = taught.then(|| MainEnd {
+        share: sharing.share(REGION),
+        success: sharing.success(REGION),
+        gate: sharing.gate(REGION),
+        learned,
+        refused,
+    });
+    let phases = metrics::phases(&episodes, main.as_ref());
+    let results = Results {
+        schema: 1,
+        session: folder.display().to_string(),
+        task: sidecar.task.clone(),
+        preset: sidecar.preset.clone(),
+        mode: sidecar.mode.word(),
+        learner: sidecar.learner.clone(),
+        operator: sidecar.operator.clone(),
+        seed: sidecar.seed,
+        subject: sidecar.subject.to_string(),
+        trial: sidecar.trial.0,
+        status,
+        phases,
+    };
+    let timing = outcome
+        .lateness_us
+        .filter(|histogram| !histogram.is_empty())
+        .map(|histogram| timing(&histogram, outcome.missed, lost_rows, frames));
+    let last = Sidecar {
+        status,
+        ended: Some(clock::timestamp()),
+        timing,
+        phases: phase_values(&results.phases),
+        ..sidecar
+    };
+    recorder.finish(last).map_err(|error| {
+        RunError::Failed(format!(
+            "{error}\nall rollouts before that are kept; go on with: coadapt run --resume {}",
+            folder.display()
+        ))
+    })?;
+    Ok(Finished { results, cause, folder, episodes, tenths: means, signal })
+}
+
+/// The autonomous rollouts of each tenth's policy. The last tenth is the final policy,
+/// whose rollouts the autonomous phase just did, on the same starts and noise.
+fn evaluation(
+    profile: &Profile,
+    tenths: &[(u8, Model)],
+    seed: u64,
+    episodes: &[EpisodeRow],
+) -> Vec<EvaluationRow> {
+    let done: Vec<EpisodeRow> =
+        metrics::rollouts_of(episodes, Phase::Autonomous).copied().collect();
+    let mut rows = Vec::new();
+    for (percent, learner) in tenths {
+        let rollouts = if *percent == 100 && !done.is_empty() {
+            done.clone()
+        } else {
+            evaluate::autonomous(profile, learner, seed)
+        };
+        rows.extend(rollouts.iter().map(|row| EvaluationRow {
+            policy: policy_name(*percent),
+            episode: row.episode,
+            start: row.start,
+            steps: row.steps,
+            duration_s: row.duration_s,
+            end: row.end,
+            total: row.total,
+            mean_reward: row.mean_reward,
+        }));
+    }
+    rows
+}
+
+fn policy_name(percent: u8) -> String {
+    format!("policy-{percent:03}")
+}
+
+fn tenth_means(tenths: &[(u8, Model)], rows: &[EvaluationRow]) -> Vec<(u8, f64)> {
+    tenths
+        .iter()
+        .map(|(percent, _)| {
+            let name = policy_name(*percent);
+            let durations: Vec<f64> =
+                rows.iter().filter(|row| row.policy == name).map(|row| row.duration_s).collect();
+            (*percent, metrics::mean(&durations))
+        })
+        .collect()
+}
+
+fn timing(histogram: &Histogram<u64>, missed: u64, lost_rows: u64, frames: u64) -> Timing {
+    Timing {
+        ticks: histogram.len(),
+        missed,
+        lost_rows,
+        lateness_us: Lateness {
+            p50: histogram.value_at_quantile(0.5),
+            p99: histogram.value_at_quantile(0.99),
+            max: histogram.max(),
+        },
+        realtime_priority: false,
+        screen_frames: frames,
+    }
+}
+
+fn phase_values(phases: &Phases) -> std::collections::BTreeMap<String, serde_json::Value> {
+    match serde_json::to_value(phases) {
+        Ok(serde_json::Value::Object(phases)) => phases.into_iter().collect(),
+        _ => std::collections::BTreeMap::new(),
+    }
+}

@@ -1,0 +1,474 @@
+//! One session, put together from an order or taken up again from its folder.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use serde::Serialize;
+
+use super::RunError;
+use super::outcome::{Finished, conclude};
+use crate::clock::{self, Clock, WallClock};
+use crate::control::cycle::{Crew, Cycle, Rules};
+use crate::control::scribe::{Origin, Scribe, standing_of};
+use crate::control::snapshot::{Watcher, channel};
+use crate::control::witness::Standing;
+use crate::learner::{Learner, Model};
+use crate::operator::script::Script;
+use crate::operator::shaping::Shaping;
+use crate::operator::simulated::Simulated;
+use crate::operator::terminal::{Hands, Keyboard};
+use crate::operator::{self, Choice, Operator};
+use crate::profile::{Document, Experiment, Order, Profile};
+use crate::random::{Place, Purpose, draw_seed, stream};
+use crate::record::sidecar::Host;
+use crate::record::{
+    self, EpisodeRow, Folder, Manner, Recorder, Sidecar, Status, assignment, folder, policy,
+};
+use crate::session::machine::{self, Stage};
+use crate::session::plan::{Plan, Wanted};
+use crate::session::{Moment, Phase, Trial};
+use crate::sharing::Mode;
+use crate::study::evaluate::simulated_backend;
+
+/// The keyboard as a session needs it: what the terminal's reader feeds, and the clock that
+/// both go by.
+#[derive(Clone, Debug)]
+pub struct Keys {
+    /// The steering keys.
+    pub hands: Hands,
+    /// The time of key events and ticks.
+    pub clock: WallClock,
+}
+
+/// A session ready to run.
+pub struct Session {
+    pub(super) cycle: Cycle<Scribe>,
+    pub(super) profile: Profile,
+    pub(super) sidecar: Sidecar,
+    pub(super) folder: PathBuf,
+    pub(super) keys: Option<Keys>,
+    /// Frames drawn so far, counted by the screen.
+    pub frames: Arc<AtomicU64>,
+    /// Looks at the session and asks things of it.
+    pub watcher: Watcher,
+    /// What the person should know before it begins.
+    pub notices: Vec<String>,
+}
+
+/// How a session's time and people are.
+#[derive(Clone, Debug)]
+pub enum Company {
+    /// Nobody is there; virtual time.
+    Headless,
+    /// A person at a screen; the wall's time.
+    Attended(Keys),
+}
+
+impl Company {
+    const fn manner(&self) -> Manner {
+        match self {
+            Self::Headless => Manner::Virtual,
+            Self::Attended(_) => Manner::Live,
+        }
+    }
+
+    const fn is_attended(&self) -> bool {
+        matches!(self, Self::Attended(_))
+    }
+
+    fn stamp(&self) -> fn() -> String {
+        match self {
+            Self::Headless => String::new,
+            Self::Attended(_) => clock::timestamp,
+        }
+    }
+
+    fn keys(self) -> Option<Keys> {
+        match self {
+            Self::Headless => None,
+            Self::Attended(keys) => Some(keys),
+        }
+    }
+}
+
+/// Reads the order's profile with its changes.
+///
+/// # Errors
+/// When there is no such profile, or with all its faults.
+pub fn profile_of(order: &Order) -> Result<Profile, RunError> {
+    let mut document = Document::find(&order.profile, Path::new("profiles"))
+        .map_err(|error| RunError::Usage(error.to_string()))?;
+    for (key, value) in &order.sets {
+        document.set(key, value);
+    }
+    document.read().map_err(|report| RunError::Usage(report.render(super::wants_colour())))
+}
+
+impl Session {
+    /// A new session.
+    ///
+    /// # Errors
+    /// When the order cannot be carried out; nothing is left on the disk then.
+    pub fn begin(order: &Order, company: Company) -> Result<Self, RunError> {
+        let profile = profile_of(order)?;
+        if order.backend != "simulated" {
+            return Err(RunError::Usage(format!(
+                "backend {:?} is not known; this version drives the simulated plant: \
+                 leave --backend out or give simulated",
+                order.backend
+            )));
+        }
+        let seed = match order.seed {
+            Some(seed) => seed,
+            None => draw_seed().map_err(|error| {
+                RunError::Failed(format!("no seed could be drawn ({error}); give one with --seed"))
+            })?,
+        };
+        let policy = order_policy(order, &profile)?;
+        let (mode, assigned) = match (&policy, profile.mode.fixed()) {
+            (Some(policy), _) => (policy.mode, false),
+            (None, Some(mode)) => (mode, false),
+            (None, None) => (assigned_mode(order, &profile, seed), true),
+        };
+        let choice: Choice =
+            order.operator.parse().map_err(|e: operator::UnknownOperator| usage(&e))?;
+        let hand = steer(&choice, &profile, seed, &company)?;
+        let plan = Plan::new(&profile.session, profile.tick(), seed, company.is_attended());
+        let fresh = fresh_learner(&profile)?;
+
+        let created = Folder::create(
+            &order.logs,
+            &order.subject,
+            order.trial.map(Trial),
+            profile.experiment.name(),
+            mode.word(),
+        )
+        .map_err(|error| RunError::Failed(error.to_string()))?;
+        let sidecar = Sidecar {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            task: profile.experiment.name().to_owned(),
+            preset: profile.preset.clone(),
+            mode,
+            assigned,
+            learner: word_of(&profile.learner.kind),
+            operator: choice.to_string(),
+            backend: order.backend.clone(),
+            subject: order.subject.clone(),
+            trial: created.trial,
+            seed,
+            status: Status::Running,
+            started: clock::timestamp(),
+            ended: None,
+            key_releases: None,
+            devices: vec![choice.to_string()],
+            host: host(),
+            timing: None,
+            planned: plan.phases.iter().map(|phase| phase.phase).collect(),
+            profile_ron: profile.to_ron(),
+            profile: serde_json::to_value(&profile).unwrap_or_default(),
+            phases: std::collections::BTreeMap::new(),
+            resumed: Vec::new(),
+        };
+        let folder = created.folder.path().to_owned();
+        let recorder = Recorder::start(
+            created.folder,
+            profile.experiment.columns(),
+            company.manner(),
+            &sidecar,
+        )
+        .map_err(|error| RunError::Failed(error.to_string()))?;
+        let learner = policy.map_or_else(|| fresh.clone(), |policy| policy.learner);
+        let parts = Parts { profile, sidecar, folder, plan, fresh, hand, recorder };
+        let notices = created.notice.into_iter().collect();
+        Ok(parts.assemble(learner, None, Vec::new(), company, notices))
+    }
+
+    /// Takes up the session in `folder` where it was cut.
+    ///
+    /// # Errors
+    /// When there is none, it is complete, or its files are damaged; they are untouched then.
+    pub fn resume(path: &Path, company: Company) -> Result<Self, RunError> {
+        let failed = |error: record::Error| RunError::Usage(error.to_string());
+        let folder = Folder::open(path).map_err(failed)?;
+        // Everything that could be refused is looked at before the folder is touched.
+        let sidecar = record::read_sidecar(&path.join("session.json")).map_err(failed)?;
+        let profile = Document::from_text("session.json", sidecar.profile_ron.clone())
+            .read()
+            .map_err(|report| RunError::Usage(report.to_string()))?;
+        let choice: Choice =
+            sidecar.operator.parse().map_err(|e: operator::UnknownOperator| usage(&e))?;
+        let hand = steer(&choice, &profile, sidecar.seed, &company)?;
+        let plan = Plan::new(&profile.session, profile.tick(), sidecar.seed, company.is_attended());
+        let fresh = fresh_learner(&profile)?;
+        let frozen = record::read_policy::<Model>(&path.join("policy.json")).ok();
+        let resumed =
+            folder.resume::<Model>(company.manner(), &(company.stamp())()).map_err(failed)?;
+        let tenths = (1..=resumed.checkpoint.tenths)
+            .filter_map(|k| {
+                let file = path.join(policy::file_name(Some(k * 10)));
+                Some((k * 10, record::read_policy::<Model>(&file).ok()?.learner))
+            })
+            .collect();
+        let moment = resumed.checkpoint.moment;
+        let standing = standing_of(resumed.checkpoint, frozen.map(|policy| policy.learner));
+        let Some(standing) = standing else {
+            return Err(RunError::Failed(format!(
+                "{}: what was learned is missing (checkpoint.json and policy.json): this \
+                 session cannot be resumed",
+                path.display()
+            )));
+        };
+        let notice = format!(
+            "resumed at {} {}; {} rows of the cut rollout were dropped",
+            moment.phase, moment.rollout, resumed.dropped_steps
+        );
+        let learner = standing.learner.clone().unwrap_or_else(|| fresh.clone());
+        let parts = Parts {
+            profile,
+            sidecar: resumed.sidecar,
+            folder: path.to_owned(),
+            plan,
+            fresh,
+            hand,
+            recorder: resumed.recorder,
+        };
+        let from = Some((standing, resumed.episodes));
+        Ok(parts.assemble(learner, from, tenths, company, vec![notice]))
+    }
+
+    /// The session's folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The session's facts.
+    #[must_use]
+    pub const fn sidecar(&self) -> &Sidecar {
+        &self.sidecar
+    }
+
+    /// The session's profile.
+    #[must_use]
+    pub const fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// Runs it to its end, evaluates its policies and writes its last files. `signal` is
+    /// the signal that asked for the end, if one did.
+    ///
+    /// # Errors
+    /// When the session could not be written down whole.
+    pub fn run(
+        self,
+        clock: &mut dyn Clock,
+        signal: impl Fn() -> Option<i32>,
+    ) -> Result<Finished, RunError> {
+        let outcome = self.cycle.run(clock);
+        let key_releases = self.keys.as_ref().map(|k| k.hands.knowledge().words().to_owned());
+        let sidecar = Sidecar {
+            key_releases: key_releases.filter(|_| self.sidecar.operator == "keyboard"),
+            ..self.sidecar
+        };
+        let frames = self.frames.load(Ordering::Relaxed);
+        conclude(self.profile, sidecar, self.folder, outcome, frames, signal())
+    }
+}
+
+/// What a new and a resumed session have in common.
+struct Parts {
+    profile: Profile,
+    sidecar: Sidecar,
+    folder: PathBuf,
+    plan: Plan,
+    fresh: Model,
+    hand: Box<dyn Operator>,
+    recorder: Recorder<Model>,
+}
+
+impl Parts {
+    fn assemble(
+        self,
+        learner: Model,
+        from: Option<(Standing, Vec<EpisodeRow>)>,
+        tenths: Vec<(u8, Model)>,
+        company: Company,
+        notices: Vec<String>,
+    ) -> Session {
+        let Self { profile, sidecar, folder, plan, fresh, hand, recorder } = self;
+        let tick = profile.tick();
+        let task = profile.experiment.task(tick);
+        let origin = Origin {
+            task: sidecar.task.clone(),
+            preset: sidecar.preset.clone(),
+            mode: sidecar.mode,
+            subject: sidecar.subject.clone(),
+            trial: sidecar.trial,
+            features: task.feature_names().iter().map(|name| (*name).to_owned()).collect(),
+            action_limit: task.action_limit(),
+        };
+        let scribe = Scribe::new(recorder, origin, plan.clone(), tenths, company.stamp());
+        let (publisher, watcher) =
+            channel(Stage::Instruction(Moment::start_of(Phase::Introduction)));
+        let rules = Rules {
+            plan,
+            tick,
+            mode: sidecar.mode,
+            sharing: profile.sharing.clone(),
+            teaching: profile.teaching.clone(),
+            fresh,
+        };
+        let crew = Crew {
+            task,
+            backend: simulated_backend(&profile, sidecar.seed),
+            operator: hand,
+            witness: scribe,
+            publisher: Some(publisher),
+        };
+        let cycle = Cycle::new(rules, crew, learner, from);
+        let keys = company.keys();
+        let frames = Arc::default();
+        Session { cycle, profile, sidecar, folder, keys, frames, watcher, notices }
+    }
+}
+
+fn usage(error: &dyn std::fmt::Display) -> RunError {
+    RunError::Usage(error.to_string())
+}
+
+/// The one word that `value` is written as.
+fn word_of(value: &impl Serialize) -> String {
+    serde_json::to_value(value)
+        .ok()
+        .and_then(|word| word.as_str().map(str::to_owned))
+        .unwrap_or_default()
+}
+
+fn fresh_learner(profile: &Profile) -> Result<Model, RunError> {
+    let task = profile.experiment.task(profile.tick());
+    profile
+        .learner
+        .build(task.feature_names().len(), task.action_limit())
+        .map_err(|error| usage(&error))
+}
+
+/// The policy that the order asks for, read and fitting.
+fn order_policy(
+    order: &Order,
+    profile: &Profile,
+) -> Result<Option<record::Policy<Model>>, RunError> {
+    let phases = &profile.session.phases;
+    let teaches = phases.contains(&Wanted::Main);
+    let path = match &order.policy {
+        Some(_) if teaches => {
+            return Err(RunError::Usage(
+                "--policy serves sessions without a main phase, since main teaches a policy of \
+                 its own: add --phases autonomous"
+                    .to_owned(),
+            ));
+        }
+        None if teaches || !phases.contains(&Wanted::Autonomous) => return Ok(None),
+        None => {
+            return Err(RunError::Usage(
+                "without a main phase the robot has learned nothing: give --policy FILE, or \
+                 --policy last for this subject's latest"
+                    .to_owned(),
+            ));
+        }
+        Some(word) if word == "last" => last_policy(order, profile)?,
+        Some(file) => PathBuf::from(file),
+    };
+    let policy: record::Policy<Model> = record::read_policy(&path).map_err(|e| usage(&e))?;
+    let task = profile.experiment.task(profile.tick());
+    let wanted = task.feature_names().len();
+    if policy.task != task.name() || policy.learner.inputs() != wanted {
+        return Err(RunError::Usage(format!(
+            "{}: this policy is for {} with {} inputs, not for {} with {wanted}",
+            path.display(),
+            policy.task,
+            policy.learner.inputs(),
+            task.name(),
+        )));
+    }
+    Ok(Some(policy))
+}
+
+/// The subject's latest final policy for the task.
+fn last_policy(order: &Order, profile: &Profile) -> Result<PathBuf, RunError> {
+    let kept = folder::trials(&order.logs, &order.subject).map_err(|e| usage(&e))?;
+    let task = profile.experiment.name();
+    kept.iter()
+        .rev()
+        .map(|kept| kept.path.join(policy::file_name(None)))
+        .find(|path| record::read_policy::<Model>(path).is_ok_and(|policy| policy.task == task))
+        .ok_or_else(|| {
+            RunError::Usage(format!(
+                "--policy last: subject {} has no policy for {task} in {}; give its file",
+                order.subject,
+                order.logs.display()
+            ))
+        })
+}
+
+/// The mode that the subject had, or the one that fewer subjects have.
+fn assigned_mode(order: &Order, profile: &Profile, seed: u64) -> Mode {
+    let task = profile.experiment.name();
+    assignment::mode_of(&order.logs, &order.subject, task).unwrap_or_else(|| {
+        let so_far = assignment::modes_so_far(&order.logs, task);
+        let mut chance = stream(seed, Purpose::Assignment, Place::default());
+        assignment::assign(&so_far, &mut chance)
+    })
+}
+
+/// The operator that `choice` names.
+fn steer(
+    choice: &Choice,
+    profile: &Profile,
+    seed: u64,
+    company: &Company,
+) -> Result<Box<dyn Operator>, RunError> {
+    let tick = profile.tick();
+    let limit = profile.experiment.task(tick).action_limit();
+    let params = &profile.operator;
+    Ok(match choice {
+        Choice::None => Box::new(operator::Nobody),
+        Choice::Script(file) => {
+            let phases = [Phase::Introduction, Phase::Main]
+                .map(|phase| (phase.word(), Moment::start_of(phase).place().phase));
+            Box::new(Script::load(file, &phases, limit).map_err(|error| usage(&error))?)
+        }
+        Choice::Simulated(skill, kind) => {
+            let Experiment::Balance { plant, .. } = &profile.experiment;
+            Box::new(Simulated::new(&params.simulated, *skill, *kind, seed, tick, plant))
+        }
+        Choice::Keyboard => match company {
+            Company::Attended(Keys { hands, clock }) => {
+                let shaping = Shaping { dead_zone: 0.0, sensitivity: params.sensitivity, limit };
+                Box::new(Keyboard::new(hands.clone(), *clock, &params.keyboard, shaping))
+            }
+            Company::Headless => {
+                return Err(RunError::Usage(
+                    "a headless session has no keyboard: give --operator simulated:average, \
+                     script:FILE or none"
+                        .to_owned(),
+                ));
+            }
+        },
+    })
+}
+
+fn host() -> Host {
+    let release = std::fs::read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
+    Host {
+        os: format!("{} {}", std::env::consts::OS, release.trim()).trim().to_owned(),
+        architecture: std::env::consts::ARCH.to_owned(),
+        terminal: std::env::var("TERM").ok(),
+    }
+}
+
+/// Where a session would begin, for a screen that shows it before its first tick.
+#[must_use]
+pub fn first_stage(plan: &Plan) -> Stage {
+    machine::begin(plan, None).0
+}

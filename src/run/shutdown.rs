@@ -1,0 +1,63 @@
+//! Signals: they end the session the way a key does.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI32, Ordering};
+
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use crate::control::snapshot::{Command, Watcher};
+
+/// Remembers the signal that asked the program to end.
+#[derive(Clone, Debug, Default)]
+pub struct Shutdown {
+    signal: Arc<AtomicI32>,
+    sessions: Arc<std::sync::Mutex<Option<Watcher>>>,
+}
+
+impl Shutdown {
+    /// Listens to INT, TERM and HUP from now on.
+    #[must_use]
+    pub fn listen() -> Self {
+        let shutdown = Self::default();
+        if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP]) {
+            let heard = shutdown.clone();
+            let listener = std::thread::Builder::new().name("coadapt-signals".to_owned());
+            // Without a listener signals keep their default: the program ends at once,
+            // and the session can be resumed.
+            let _ = listener.spawn(move || {
+                for signal in signals.forever() {
+                    heard.hear(signal);
+                }
+            });
+        }
+        shutdown
+    }
+
+    /// The signal that came, if one did.
+    #[must_use]
+    pub fn signal(&self) -> Option<i32> {
+        Some(self.signal.load(Ordering::SeqCst)).filter(|signal| *signal != 0)
+    }
+
+    /// Ends the watched session, in place of an earlier one, when a signal comes or came.
+    pub fn abort_on_signal(&self, session: Watcher) {
+        if let Some(signal) = self.signal() {
+            session.ask(abort(signal));
+        }
+        *self.sessions.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(session);
+    }
+
+    fn hear(&self, signal: i32) {
+        self.signal.store(signal, Ordering::SeqCst);
+        let session = self.sessions.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(session) = &*session {
+            session.ask(abort(signal));
+        }
+    }
+}
+
+fn abort(signal: i32) -> Command {
+    let name = signal_hook::low_level::signal_name(signal).unwrap_or("a signal");
+    Command::Abort(format!("{name} arrived"))
+}

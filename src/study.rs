@@ -1,0 +1,4 @@
+//! Runs without a screen: evaluation of policies and open-loop simulation.
+
+pub mod evaluate;
+pub mod simulate;

@@ -1,0 +1,54 @@
+//! What a policy achieves alone, over many starts.
+
+use crate::backend::safety::{Limits, Safe};
+use crate::backend::simulated::Simulated;
+use crate::clock::VirtualClock;
+use crate::control::cycle::{Crew, Cycle, Rules};
+use crate::control::witness;
+use crate::learner::Model;
+use crate::operator;
+use crate::profile::Profile;
+use crate::record::EpisodeRow;
+use crate::session::Phase;
+use crate::session::plan::{Plan, Wanted};
+use crate::sharing::Mode;
+use crate::signal::Seconds;
+
+/// A simulated plant within its limits.
+#[must_use]
+pub fn simulated_backend(profile: &Profile, seed: u64) -> Safe {
+    let tick = profile.tick();
+    let plant = profile.experiment.plant(tick);
+    let limit = profile.experiment.task(tick).action_limit();
+    let limits = Limits { action: limit, stale: Seconds(3.0 * tick.0) };
+    Safe::new(Box::new(Simulated::new(plant, seed)), limits)
+}
+
+/// The autonomous rollouts of `learner`, on virtual time, with the starts and the noise
+/// that a session of `profile` and `seed` gives its autonomous phase.
+#[must_use]
+pub fn autonomous(profile: &Profile, learner: &Model, seed: u64) -> Vec<EpisodeRow> {
+    let tick = profile.tick();
+    let mut session = profile.session.clone();
+    session.phases = vec![Wanted::Autonomous];
+    session.autonomous_hold_s = 0.0;
+    let mut plan = Plan::new(&session, tick, seed, false);
+    plan.phases.retain(|plan| plan.phase == Phase::Autonomous);
+    let rules = Rules {
+        plan,
+        tick,
+        mode: Mode::Simultaneous,
+        sharing: profile.sharing.clone(),
+        teaching: profile.teaching.clone(),
+        fresh: learner.clone(),
+    };
+    let crew = Crew {
+        task: profile.experiment.task(tick),
+        backend: simulated_backend(profile, seed),
+        operator: Box::new(operator::Nobody),
+        witness: witness::Nobody,
+        publisher: None,
+    };
+    let cycle = Cycle::new(rules, crew, learner.clone(), None);
+    cycle.run(&mut VirtualClock::default()).episodes
+}

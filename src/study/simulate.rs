@@ -1,0 +1,191 @@
+//! A plant open loop: a start, a table of actions, a table of states.
+
+use std::io::{self, Read, Write};
+
+use crate::profile::Profile;
+use crate::random::{Place, Purpose, stream};
+use crate::signal::{Action, State};
+
+/// Why a simulation could not be done.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulateError {
+    /// The start has the wrong numbers.
+    #[error(
+        "--start {given:?}: {problem}; give {count} finite numbers, {columns}, such as {example}"
+    )]
+    Start {
+        /// As given.
+        given: String,
+        /// What is wrong.
+        problem: String,
+        /// How many are needed.
+        count: usize,
+        /// The state's columns.
+        columns: String,
+        /// A good one.
+        example: String,
+    },
+    /// The table of actions has faults.
+    #[error("{}", .0.join("\n"))]
+    Actions(Vec<String>),
+    /// Writing failed.
+    #[error("the table of states could not be written: {0}")]
+    Io(#[from] io::Error),
+}
+
+/// The most faults of a table that are told.
+const MOST_FAULTS: usize = 20;
+
+/// Reads `x,…` as a state of the profile's plant.
+///
+/// # Errors
+/// When it is not the right number of finite numbers.
+pub fn start(profile: &Profile, given: &str) -> Result<State, SimulateError> {
+    let columns = profile.experiment.columns();
+    let refuse = |problem: String| SimulateError::Start {
+        given: given.chars().take(80).collect(),
+        problem,
+        count: columns.len(),
+        columns: columns.join(","),
+        example: vec!["0"; columns.len()].join(","),
+    };
+    let mut numbers = Vec::new();
+    for cell in given.split(',') {
+        let number: f64 =
+            cell.trim().parse().map_err(|_| refuse(format!("{cell:?} is not a number")))?;
+        if !number.is_finite() {
+            return Err(refuse(format!("{cell} is not finite")));
+        }
+        numbers.push(number);
+    }
+    if numbers.len() != columns.len() {
+        return Err(refuse(format!("it has {} numbers", numbers.len())));
+    }
+    State::from_slice(&numbers).ok_or_else(|| refuse("it has too many numbers".to_owned()))
+}
+
+/// Reads the column `u` of a CSV table, a row a control step. `name` is the table's, for
+/// messages.
+///
+/// # Errors
+/// With the place of every wrong cell, up to twenty.
+pub fn actions(name: &str, table: impl Read) -> Result<Vec<f64>, SimulateError> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(table);
+    let told = |error: &csv::Error| format!("{name}: {error}");
+    let headers = reader.headers().map_err(|e| SimulateError::Actions(vec![told(&e)]))?.clone();
+    let Some(column) = headers.iter().position(|header| header == "u") else {
+        let found = headers.iter().take(10).collect::<Vec<_>>().join(",");
+        return Err(SimulateError::Actions(vec![format!(
+            "{name}, line 1: there is no column `u`, only {found:?}; the first line names the \
+             columns, then follows one action a control step"
+        )]));
+    };
+    let mut actions = Vec::new();
+    let mut faults = Vec::new();
+    for record in reader.records() {
+        let record = match record {
+            Ok(record) => record,
+            Err(error) => {
+                faults.push(told(&error));
+                break;
+            }
+        };
+        let cell = record.get(column).unwrap_or("");
+        match cell.parse::<f64>() {
+            Ok(action) if action.is_finite() => actions.push(action),
+            _ => {
+                let line = record.position().map_or(0, csv::Position::line);
+                faults.push(format!(
+                    "{name}, line {line}, column u: {cell:?} is not a finite number"
+                ));
+            }
+        }
+        if faults.len() >= MOST_FAULTS {
+            faults.push("further lines were not read".to_owned());
+            break;
+        }
+    }
+    if faults.is_empty() { Ok(actions) } else { Err(SimulateError::Actions(faults)) }
+}
+
+/// Lets the plant go from `start` under `actions`, clipped to the plant's limit, and
+/// writes `step,t,` and the state before each action and after the last one.
+///
+/// # Errors
+/// When writing fails.
+pub fn simulate(
+    profile: &Profile,
+    start: State,
+    actions: &[f64],
+    seed: u64,
+    table: impl Write,
+) -> Result<(), SimulateError> {
+    let tick = profile.tick();
+    let limit = profile.experiment.task(tick).action_limit();
+    let mut plant = profile.experiment.plant(tick);
+    plant.reseed(stream(seed, Purpose::Friction, Place::default()));
+    let mut writer = csv::Writer::from_writer(table);
+    let io = |error: csv::Error| match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => io::Error::other(format!("{other:?}")),
+    };
+    let mut header = vec!["step", "t"];
+    header.extend(profile.experiment.columns());
+    writer.write_record(&header).map_err(io)?;
+    let mut state = start;
+    for step in 0..=actions.len() {
+        let t = f64::from(u32::try_from(step).unwrap_or(u32::MAX)) * tick.0;
+        writer.serialize((step, t, &state[..])).map_err(io)?;
+        if let Some(action) = actions.get(step) {
+            state = plant.step(&state, Action(action.clamp(-limit, limit)));
+        }
+    }
+    writer.flush()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::profile::Document;
+
+    fn profile() -> Profile {
+        Document::from_text("balance", "(task: \"balance\")").read().unwrap()
+    }
+
+    #[test]
+    fn a_start_must_be_a_whole_finite_state() {
+        let profile = profile();
+        assert_eq!(start(&profile, "0, 0,0.05,-1").unwrap(), State::new([0.0, 0.0, 0.05, -1.0]));
+        for (bad, word) in [
+            ("", "not a number"),
+            ("1,2", "2 numbers"),
+            ("0,0,NaN,0", "not finite"),
+            ("0,0,x,0", "\"x\""),
+        ] {
+            let message = start(&profile, bad).unwrap_err().to_string();
+            assert!(message.contains(word) && message.contains("theta"), "{message}");
+        }
+    }
+
+    #[test]
+    fn all_wrong_actions_are_named_at_once() {
+        assert_eq!(actions("f", "u\n1\n-2.5\n".as_bytes()).unwrap(), [1.0, -2.5]);
+        let told = |text: &str| actions("f.csv", text.as_bytes()).unwrap_err().to_string();
+        let message = told("u\n1\nNaN\n\"x\"\n");
+        assert!(message.contains("line 3") && message.contains("line 4"), "{message}");
+        assert!(told("v\n1\n").contains("no column `u`"));
+    }
+
+    #[test]
+    fn the_table_has_a_row_before_each_action_and_one_after_the_last() {
+        let mut table = Vec::new();
+        simulate(&profile(), State::new([0.0; 4]), &[0.0, 0.0], 1, &mut table).unwrap();
+        let text = String::from_utf8(table).unwrap();
+        assert_eq!(
+            text,
+            "step,t,x,x_dot,theta,theta_dot\n0,0.0,0.0,0.0,0.0,0.0\n1,0.02,0.0,0.0,0.0,0.0\n\
+             2,0.04,0.0,0.0,0.0,0.0\n"
+        );
+    }
+}
