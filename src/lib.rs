@@ -13,3 +13,4 @@ pub mod sharing;
 pub mod signal;
 pub mod task;
 pub mod teaching;
+pub mod tui;
