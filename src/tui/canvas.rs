@@ -83,8 +83,14 @@ impl Canvas {
         self.fill(from, to, role, |p| p.0 >= from.0 && p.0 < to.0 && p.1 >= from.1 && p.1 < to.1);
     }
 
-    /// A filled disc.
+    /// A filled disc; where there are no dots a small one is a pair of letters.
     pub fn disc(&mut self, middle: Point, radius: f64, role: Role) {
+        if self.glyphs == Glyphs::Ascii && radius < 3.0 {
+            let (column, row) = (middle.0 / DOTS_ACROSS, middle.1 / DOTS_DOWN);
+            self.glyph(column - 0.5, row, 'O', role);
+            self.glyph(column + 0.5, row, 'O', role);
+            return;
+        }
         self.capsule(middle, middle, radius, role);
     }
 
@@ -182,7 +188,7 @@ impl Canvas {
             Glyphs::Ascii => match (lit & UPPER != 0, lit & !UPPER != 0) {
                 _ if lit.count_ones() >= 5 => '#',
                 (true, true) => '+',
-                (true, false) => '"',
+                (true, false) => '-',
                 (false, _) => '_',
             },
         }
@@ -236,7 +242,7 @@ mod tests {
     #[test]
     fn dots_become_the_terminals_glyphs() {
         for (glyphs, whole, upper) in
-            [(Glyphs::Braille, '⣿', '⠛'), (Glyphs::Half, '█', '▀'), (Glyphs::Ascii, '#', '"')]
+            [(Glyphs::Braille, '⣿', '⠛'), (Glyphs::Half, '█', '▀'), (Glyphs::Ascii, '#', '-')]
         {
             let mut canvas = Canvas::new(2, 1, glyphs);
             canvas.rectangle((0.0, 0.0), (2.0, 4.0), Role::Text);

@@ -44,6 +44,6 @@ pub fn hints(pen: &mut Pen<'_>, y: u16, screen: Screen) {
             break;
         }
         x = pen.text(x, y, key, Role::Strong);
-        x = pen.text(x + 1, y, word, Role::Dim) + 3;
+        x = pen.text(x + 1, y, word, Role::Dim) + 2;
     }
 }

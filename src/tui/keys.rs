@@ -135,7 +135,7 @@ pub const BINDINGS: &[Binding] = {
         elsewhere(Live, "← →", "push", "push the cart while held; also h l and a d"),
         bind(Live, &[Char(' ')], "space", "stop", "emergency stop, until Enter", A::Stop),
         bind(Live, &[Enter], "Enter", "", "go on after a stop or a pause", A::Begin),
-        bind(Live, &[Char('P'), Esc], "P Esc", "pause", "pause, or go on", A::Pause),
+        bind(Live, &[Char('P'), Esc], "P", "pause", "pause, or go on; also Esc", A::Pause),
         bind(Live, &[Char('x')], "x", "discard", "throw this rollout away, repeat it", A::Discard),
         bind(Live, &[Char('f')], "f", "", "faster while nobody steers: 1 4 16× max", A::Faster),
         bind(Live, &[Char('p')], "p", "progress", "show or hide share and success", A::Progress),

@@ -291,7 +291,7 @@ fn scene(pen: &mut Pen<'_>, view: &View<'_>) {
         let left = f64::from(ticks_left) * info.tick_s;
         let bar = width.min(64);
         let mut row = pen.part((width - bar) / 2, height - 1, bar, 1);
-        strip::countdown(&mut row, "WAIT", left, whole, 1);
+        strip::countdown(&mut row, ("WAIT", Role::Wait), left, whole, 1);
     }
 }
 

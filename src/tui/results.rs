@@ -150,7 +150,7 @@ fn statistics(info: &Info, phases: &[Phase]) -> Vec<String> {
         let squares = times.iter().map(|time| (time - average).powi(2)).sum::<f64>();
         let deviation = (squares / (real(times.len()) - 1.0)).sqrt();
         Some(format!(
-            "{:<13} {:>4} rollouts   {} s ± {} s (mean ± sd)",
+            "{:<13}{:>4} rollouts   mean {} s   sd {} s",
             live::phase_word(*phase),
             times.len(),
             fixed(average, 6, 2),

@@ -151,7 +151,7 @@ fn facts(pen: &mut Pen<'_>, view: &View<'_>) {
 
     let number = |index: usize| seen.state.get(index).copied().unwrap_or(f64::NAN).to_degrees();
     left(pen, 2, "angle", &format!("{}°", signed(number(2), 6, 1)), Role::Text);
-    right(pen, 2, "speed", &format!("{} °/s", signed(number(3), 5, 0)));
+    right(pen, 2, "speed", &format!("{} °/s", signed(number(3), 4, 0)));
     let fields = format!("{:>4}/{}", seen.fields, view.info.field_cap);
     left(pen, 3, "fields", &fields, Role::Text);
     right(pen, 3, "learned", &count(seen.learned, 6));

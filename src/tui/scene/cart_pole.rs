@@ -18,9 +18,17 @@ pub struct Geometry {
 }
 
 /// The drawn cart's width, m: it has no width in the equations.
-const CART_WIDTH_M: f64 = 0.24;
+const CART_WIDTH_M: f64 = 0.3;
 /// The distance of marks along the track, m.
 const MARK_M: f64 = 0.25;
+
+/// The weight at the pole's tip, in radii of the pole.
+const BOB: f64 = 1.8;
+
+/// Half the pole's thickness in dots: to be seen at arm's length.
+fn pole_radius(scale: f64) -> f64 {
+    (0.03 * scale).clamp(1.4, 4.0)
+}
 
 /// Where things are, in dots.
 struct Place {
@@ -44,18 +52,23 @@ impl Place {
         let track = geometry.track_length_m.unwrap_or(2.0 * reach + CART_WIDTH_M);
         // Beside the track stand the squares, four cells and a gap at each end.
         let beside = 2.0 * 5.0 * DOTS_ACROSS;
-        let scale = ((canvas.height() - 12.0) / (1.16 * length))
+        let above_track = canvas.height() - DOTS_DOWN;
+        let rough = above_track / (length + 0.2);
+        // Whole cells, so that the cart's edges are sharp and change no cell above or below.
+        let cart_and_wheels = ((0.13 * rough / DOTS_DOWN).round() * DOTS_DOWN).clamp(8.0, 20.0);
+        let bob = BOB * pole_radius(rough);
+        let scale = ((above_track - cart_and_wheels - bob) / length)
             .min((canvas.width() - beside) / (track + CART_WIDTH_M))
             .min(canvas.width() / (track + 2.0 * reach))
             .max(1e-6);
-        let wheel = (0.025 * scale).clamp(1.0, 5.0);
-        let track_y = canvas.height() - DOTS_DOWN;
+        let wheel = 0.19 * cart_and_wheels;
+        let track_y = above_track;
         let middle_x = (canvas.width() / 2.0).floor();
         let offset = if geometry.track_length_m.is_some() { x_m * scale } else { 0.0 };
-        let cart_height = (0.08 * scale).clamp(3.0, 14.0);
+        let cart_height = cart_and_wheels - 2.0 * wheel;
         Self {
             scale,
-            cart: (middle_x + offset, track_y - 2.0 * wheel - cart_height),
+            cart: (middle_x + offset, track_y - cart_and_wheels),
             cart_half_width: (CART_WIDTH_M / 2.0 * scale).max(4.0),
             cart_height,
             wheel,
@@ -116,7 +129,7 @@ fn limits(canvas: &mut Canvas, geometry: &Geometry, place: &Place) {
     for angle in [-geometry.fail_angle_rad, geometry.fail_angle_rad] {
         let length = geometry.pole_length_m;
         let (from, to) = (place.from_pivot(0.90 * length, angle), place.from_pivot(length, angle));
-        canvas.capsule(from, to, 0.5, Role::Dim);
+        canvas.pole(from, to, 0.5, Role::Dim);
     }
 }
 
@@ -126,16 +139,15 @@ fn cart(canvas: &mut Canvas, place: &Place) {
     canvas.rectangle((x - half, y), (x + half, y + place.cart_height), Role::Text);
     for side in [-0.6, 0.6] {
         let middle = (x + side * half, place.track_y - place.wheel);
-        canvas.disc(middle, place.wheel + 0.2, Role::Text);
+        canvas.capsule(middle, middle, place.wheel + 0.2, Role::Text);
     }
 }
 
 fn pole(canvas: &mut Canvas, geometry: &Geometry, place: &Place, theta: f64) {
-    let radius = (0.03 * place.scale).clamp(1.25, 4.0);
-    let bob = 1.8 * radius;
+    let radius = pole_radius(place.scale);
     let tip = place.from_pivot(geometry.pole_length_m, theta);
     canvas.pole(place.cart, tip, radius, Role::Text);
-    canvas.disc(tip, bob, Role::Text);
+    canvas.disc(tip, BOB * radius, Role::Text);
 }
 
 /// The squares at the ends of the track, with their word below.
