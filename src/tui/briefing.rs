@@ -25,7 +25,7 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
         Stage::Break { next, ticks_left } => rest(pen, view, next, ticks_left),
         _ => {}
     }
-    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Briefing));
+    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Briefing, true));
 }
 
 fn instruction(pen: &mut Pen<'_>, view: &View<'_>, moment: Moment) {

@@ -36,10 +36,10 @@ pub fn draw(pen: &mut Pen<'_>, screen: Screen, notes: &[String]) {
     }
 }
 
-/// The line of keys at the bottom of a screen.
-pub fn hints(pen: &mut Pen<'_>, y: u16, screen: Screen) {
+/// The line of keys at the bottom of `screen`, in row `y`; `steered`: by a person.
+pub fn hints(pen: &mut Pen<'_>, y: u16, screen: Screen, steered: bool) {
     let mut x = 1;
-    for (key, word) in keys::hints(screen) {
+    for (key, word) in keys::hints(screen, steered) {
         if x + columns(key) + 1 + columns(word) > pen.width() {
             break;
         }

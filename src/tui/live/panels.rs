@@ -21,15 +21,6 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
     facts(&mut pen.part(left, 0, RIGHT, height), view);
 }
 
-/// The person's share in the present region, as the present phase has it.
-fn share(view: &View<'_>) -> f64 {
-    match view.phase() {
-        Phase::Introduction => 1.0,
-        Phase::Main => view.panel.shares.get(view.panel.region).copied().unwrap_or(1.0),
-        Phase::Autonomous | Phase::ZeroControl => 0.0,
-    }
-}
-
 /// The share's bar, and success with the gate.
 fn sharing(pen: &mut Pen<'_>, view: &View<'_>) {
     let phase = view.phase();
@@ -50,7 +41,7 @@ fn sharing(pen: &mut Pen<'_>, view: &View<'_>) {
     pen.text(VALUES - 1, 0, "▐", Role::Dim);
     pen.text(bar_end, 0, "▌", Role::Dim);
     let bar = bar_end.saturating_sub(VALUES);
-    let share = share(view);
+    let share = view.share();
     let yours = place((share.clamp(0.0, 1.0) * f64::from(bar)).round());
     if phase != Phase::ZeroControl {
         let x = pen.repeat(VALUES, 0, "█", yours, Role::You);

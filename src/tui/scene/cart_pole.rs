@@ -78,7 +78,7 @@ impl Place {
     }
 
     /// The point `length` metres from the pivot at `angle` from upright, to the right.
-    fn from_pivot(&self, length: f64, angle: f64) -> Point {
+    fn beyond_pivot(&self, length: f64, angle: f64) -> Point {
         let (sin, cos) = angle.sin_cos();
         (self.cart.0 + self.scale * length * sin, self.cart.1 - self.scale * length * cos)
     }
@@ -128,7 +128,8 @@ fn track(canvas: &mut Canvas, geometry: &Geometry, place: &Place, x_m: f64) {
 fn limits(canvas: &mut Canvas, geometry: &Geometry, place: &Place) {
     for angle in [-geometry.fail_angle_rad, geometry.fail_angle_rad] {
         let length = geometry.pole_length_m;
-        let (from, to) = (place.from_pivot(0.90 * length, angle), place.from_pivot(length, angle));
+        let (from, to) =
+            (place.beyond_pivot(0.90 * length, angle), place.beyond_pivot(length, angle));
         canvas.pole(from, to, 0.5, Role::Dim);
     }
 }
@@ -145,7 +146,7 @@ fn cart(canvas: &mut Canvas, place: &Place) {
 
 fn pole(canvas: &mut Canvas, geometry: &Geometry, place: &Place, theta: f64) {
     let radius = pole_radius(place.scale);
-    let tip = place.from_pivot(geometry.pole_length_m, theta);
+    let tip = place.beyond_pivot(geometry.pole_length_m, theta);
     canvas.pole(place.cart, tip, radius, Role::Text);
     canvas.disc(tip, BOB * radius, Role::Text);
 }
