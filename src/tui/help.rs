@@ -47,3 +47,18 @@ pub fn hints(pen: &mut Pen<'_>, y: u16, screen: Screen, steered: bool) {
         x = pen.text(x + 1, y, word, Role::Dim) + 2;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_of_keys_fits_the_smallest_screen() {
+        for (screen, steered) in Screen::ALL.into_iter().flat_map(|s| [(s, true), (s, false)]) {
+            let length: u16 = keys::hints(screen, steered)
+                .map(|(key, word)| columns(key) + columns(word) + 3)
+                .sum();
+            assert!(length > 0 && length - 2 < 80, "{}: {length}", screen.word());
+        }
+    }
+}

@@ -64,7 +64,8 @@ fn sharing(pen: &mut Pen<'_>, view: &View<'_>) {
 /// Success over the session, its value, and where the gate is.
 fn success(pen: &mut Pen<'_>, view: &View<'_>) {
     let now = view.panel.successes.get(view.panel.region).copied().unwrap_or(0.0);
-    let end = pen.width().saturating_sub(19);
+    let is_wide = pen.width() >= 80;
+    let end = pen.width().saturating_sub(if is_wide { 37 } else { 19 });
     let spark = end.saturating_sub(VALUES + 7);
     pen.text(1, 0, "success", Role::Text);
     let bars = sparkline(&view.history.success, spark.into(), 1.0);
@@ -76,7 +77,8 @@ fn success(pen: &mut Pen<'_>, view: &View<'_>) {
     let (words, role) = match view.panel.gate {
         Some(opened) => {
             let tau = fixed(opened.tau_steps, 0, 0);
-            (format!("open {}, τ {tau}", opened.step), Role::Robot)
+            let words = if is_wide { "gate opened at step" } else { "open" };
+            (format!("{words} {}, τ {tau}", opened.step), Role::Robot)
         }
         None => (format!("gate {} %: not yet", fixed(view.info.gate * 100.0, 0, 0)), Role::Dim),
     };

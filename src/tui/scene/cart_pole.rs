@@ -167,3 +167,51 @@ fn squares(canvas: &mut Canvas, geometry: &Geometry, at: &Place, light: Light) {
         canvas.text(column, word_row, light.word(), light.role());
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tui::palette::Glyphs;
+
+    /// A point in dots is inside the picture.
+    fn is_inside(canvas: &Canvas, (x, y): Point) -> bool {
+        (0.0..=canvas.width()).contains(&x) && (0.0..=canvas.height()).contains(&y)
+    }
+
+    #[test]
+    fn the_whole_pole_is_in_the_picture_wherever_a_rollout_can_go() {
+        for (columns, rows) in [(80, 14), (80, 19), (120, 30), (200, 50), (300, 20)] {
+            for pole_length_m in [0.3, 0.6, 1.0, 2.0] {
+                let canvas = Canvas::new(columns, rows, Glyphs::Braille);
+                let fail = 30_f64.to_radians();
+                let geometry =
+                    Geometry { pole_length_m, track_length_m: Some(1.0), fail_angle_rad: fail };
+                for (x, angle) in [(0.0, 0.0), (0.5, fail), (-0.5, -fail), (0.5, -fail)] {
+                    let place = Place::new(&canvas, &geometry, x);
+                    let tip = place.beyond_pivot(pole_length_m, angle);
+                    assert!(
+                        is_inside(&canvas, tip),
+                        "{columns}x{rows}, {pole_length_m} m: {tip:?}"
+                    );
+                    assert!(is_inside(&canvas, place.cart));
+                }
+                // The room is used: the pole is high, or the track is wide.
+                let place = Place::new(&canvas, &geometry, 0.0);
+                let used = (place.scale * pole_length_m / canvas.height())
+                    .max(place.scale * (1.0 + CART_WIDTH_M) / canvas.width());
+                assert!(used > 0.6, "{columns}x{rows}, {pole_length_m} m: {used}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_length_is_as_long_across_as_up() {
+        let canvas = Canvas::new(80, 14, Glyphs::Braille);
+        let geometry =
+            Geometry { pole_length_m: 1.0, track_length_m: Some(1.0), fail_angle_rad: 0.5 };
+        let (left, right) =
+            (Place::new(&canvas, &geometry, -0.5), Place::new(&canvas, &geometry, 0.5));
+        let up = left.cart.1 - left.beyond_pivot(1.0, 0.0).1;
+        assert!((right.cart.0 - left.cart.0 - up).abs() < 1e-9);
+    }
+}
