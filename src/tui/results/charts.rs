@@ -118,7 +118,7 @@ pub fn alone(pen: &mut Pen<'_>, info: &Info) {
     match &info.evaluation {
         Some(tenths) if !tenths.is_empty() => {
             let half = width / 2;
-            angles(&mut pen.part(0, 0, half, height), info);
+            angles(&mut pen.part(0, 0, half.saturating_sub(2), height), info);
             learning(&mut pen.part(half, 0, width - half, height), tenths);
         }
         _ => angles(pen, info),
@@ -137,8 +137,8 @@ fn angles(pen: &mut Pen<'_>, info: &Info) {
         Curve { name: "nobody", graph: GraphType::Scatter, role: Role::Dim, points: nobody },
         Curve { name: "robot", graph: GraphType::Scatter, role: Role::Robot, points: robot },
     ];
-    let x = Scale { title: "release angle, °", from: -widest, to: widest, decimals: 1 };
-    let y = Scale { title: "balance time, s", from: 0.0, to: even(longest), decimals: 0 };
+    let x = Scale { title: "release, °", from: -widest, to: widest, decimals: 1 };
+    let y = Scale { title: "alone, s", from: 0.0, to: even(longest), decimals: 0 };
     chart(pen, &curves, &x, &y);
 }
 
