@@ -20,3 +20,4 @@ pub mod signal;
 pub mod study;
 pub mod task;
 pub mod teaching;
+pub mod tui;
