@@ -5,8 +5,8 @@ use crate::learner::Model;
 use crate::record::checkpoint::Checkpoint;
 use crate::record::policy::Policy;
 use crate::record::{EpisodeRow, EventRow, Recorder, StepRow};
+use crate::session::Phase;
 use crate::session::plan::Plan;
-use crate::session::{Phase, Subject, Trial};
 use crate::sharing::Mode;
 
 /// What every policy of a session says about where it comes from.
@@ -18,10 +18,6 @@ pub struct Origin {
     pub preset: String,
     /// What the robot does while it learns.
     pub mode: Mode,
-    /// Who teaches it.
-    pub subject: Subject,
-    /// In which trial.
-    pub trial: Trial,
     /// The names of the learner's inputs.
     pub features: Vec<String>,
     /// The largest action.
@@ -104,15 +100,12 @@ impl Witness for Scribe {
         if let Some(percent) = percent {
             self.tenths.push((percent, learner.clone()));
         }
-        let Origin { task, preset, mode, subject, trial, features, action_limit } =
-            self.origin.clone();
+        let Origin { task, preset, mode, features, action_limit } = self.origin.clone();
         let policy = Policy {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             task,
             preset,
             mode,
-            subject,
-            trial,
             percent: percent.unwrap_or(100),
             features,
             action_limit,

@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 
 use super::document::{self, Document};
 use super::{Error, Storable};
-use crate::session::{Subject, Trial};
 use crate::sharing::Mode;
 
 /// A learner with what is needed to let it act.
@@ -20,10 +19,6 @@ pub struct Policy<M> {
     pub preset: String,
     /// What the robot did while it learned.
     pub mode: Mode,
-    /// Who taught it.
-    pub subject: Subject,
-    /// In which trial.
-    pub trial: Trial,
     /// After which part of main, in percent.
     pub percent: u8,
     /// The names of the learner's inputs, in order.

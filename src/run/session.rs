@@ -303,8 +303,6 @@ impl Parts {
             task: sidecar.task.clone(),
             preset: sidecar.preset.clone(),
             mode: sidecar.mode,
-            subject: sidecar.subject.clone(),
-            trial: sidecar.trial,
             features: task.feature_names().iter().map(|name| (*name).to_owned()).collect(),
             action_limit: task.action_limit(),
         };

@@ -115,8 +115,6 @@ pub fn a_policy(learner: Model) -> Policy<Model> {
         task: "balance".to_owned(),
         preset: "balance".to_owned(),
         mode: Mode::Sequential,
-        subject: subject(),
-        trial: Trial(3),
         percent: 100,
         features: COLUMNS.map(str::to_owned).to_vec(),
         action_limit: 10.0,

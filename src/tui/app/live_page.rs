@@ -1,0 +1,213 @@
+//! The live screen at work: draws the latest snapshot, passes keys on.
+
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use ratatui::crossterm::event::{Event, KeyEvent};
+
+use super::{Conductor, End, Next, Running, hear};
+use crate::clock::Clock;
+use crate::control::snapshot::{Command, Snapshot};
+use crate::session::Phase;
+use crate::session::machine::Stage;
+use crate::signal::Seconds;
+use crate::tui::keys::{self, Action};
+use crate::tui::live::{self, History, Ui, View};
+use crate::tui::terminal::{Screen, look};
+
+/// Numbers are renewed this often, so that they can be read.
+const PANEL: Seconds = Seconds(0.1);
+/// Success is kept for its curve this often.
+const SAMPLE: Seconds = Seconds(1.0);
+/// The speeds that `f` goes through.
+const SPEEDS: [f64; 4] = [1.0, 4.0, 16.0, f64::INFINITY];
+/// How many samples of success are kept.
+const SAMPLES: usize = 512;
+
+struct Page {
+    running: Running,
+    ui: Ui,
+    history: History,
+    panel: Snapshot,
+    panel_due: Seconds,
+    sample_due: Seconds,
+    /// Whether `q` was pressed once.
+    asked_to_end: bool,
+    /// Why the page is left once the session is over.
+    leaving: Option<End>,
+}
+
+/// Shows the session until it is over.
+pub(super) fn show(
+    screen: &mut Screen,
+    conductor: &mut dyn Conductor,
+    running: Running,
+) -> Result<Next, String> {
+    let clock = screen.feed().clock;
+    let frame_s = 1.0 / f64::from(running.screen.frames_per_s);
+    let panel = running.watcher.look();
+    let ui = Ui {
+        show_progress: running.screen.show_progress,
+        subject_view: running.screen.subject_view,
+        look: look(running.screen.glyphs),
+        ..Ui::default()
+    };
+    let history = History::default();
+    let (panel_due, sample_due) = (clock.now(), clock.now());
+    let mut page = Page {
+        running,
+        ui,
+        history,
+        panel,
+        panel_due,
+        sample_due,
+        asked_to_end: false,
+        leaving: None,
+    };
+    loop {
+        if let Some(over) = conductor.results() {
+            let info = over?;
+            return Ok(page.leaving.map_or_else(
+                || Next::Results(Box::new(info), page.running.screen.clone()),
+                Next::End,
+            ));
+        }
+        let due = clock.now() + Seconds(frame_s);
+        page.draw(screen, clock.now());
+        while clock.now() < due && page.leaving != Some(End::Lost) {
+            let patience = Duration::from_secs_f64((due - clock.now()).0.max(0.0));
+            match hear(screen, conductor, patience) {
+                Ok(Some(event)) => page.take(&event),
+                Ok(None) => break,
+                // The signal itself has ended the session already; its last file is due.
+                Err(end) => {
+                    page.leave(end);
+                    break;
+                }
+            }
+        }
+        if page.leaving.is_some() {
+            let mut pause = clock;
+            pause.wait_until(due);
+        }
+    }
+}
+
+impl Page {
+    fn draw(&mut self, screen: &mut Screen, now: Seconds) {
+        let scene = self.running.watcher.look();
+        self.running.watcher.rollouts(&mut self.history.rollouts);
+        if now >= self.panel_due {
+            self.panel = scene;
+            self.panel_due = now + PANEL;
+        }
+        if now >= self.sample_due {
+            self.sample_due = now + SAMPLE;
+            self.sample(&scene);
+        }
+        // What changes the layout must not lag behind the scene.
+        self.panel.stage = scene.stage;
+        let known = screen.feed().hands().knowledge().words();
+        if self.running.info.operator.starts_with("keyboard") {
+            self.running.info.operator = format!("keyboard, releases {known}");
+        }
+        let view = View {
+            info: &self.running.info,
+            scene: &scene,
+            panel: &self.panel,
+            history: &self.history,
+            ui: &self.ui,
+        };
+        if screen.draw(|frame| live::draw(frame, &view)).is_err() {
+            self.leave(End::Lost);
+        }
+        self.running.frames.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn sample(&mut self, scene: &Snapshot) {
+        if let Stage::Running(moment) = scene.stage
+            && moment.phase == Phase::Main
+        {
+            if self.history.success.len() == SAMPLES {
+                self.history.success.remove(0);
+            }
+            self.history.success.push(scene.successes.get(scene.region).copied().unwrap_or(0.0));
+        }
+    }
+
+    fn take(&mut self, event: &Event) {
+        if let Event::Key(key) = event {
+            self.key(*key);
+        }
+    }
+
+    fn key(&mut self, key: KeyEvent) {
+        let stage = self.running.watcher.look().stage;
+        let here = match stage {
+            Stage::Instruction(_) | Stage::Break { .. } => keys::Screen::Briefing,
+            _ => keys::Screen::Live,
+        };
+        let Some(action) = keys::action(here, key) else {
+            if key.is_press() && self.asked_to_end {
+                self.forget_question();
+            }
+            return;
+        };
+        if action != Action::Quit && self.asked_to_end {
+            self.forget_question();
+            if action != Action::QuitNow {
+                return;
+            }
+        }
+        match action {
+            Action::Begin => self.ask(Command::Begin),
+            Action::Pause => self.ask(Command::Pause),
+            Action::Discard => self.ask(Command::Discard),
+            Action::Stop => self.ask(Command::Stop),
+            Action::Faster => self.faster(),
+            Action::Progress => self.ui.show_progress = !self.ui.show_progress,
+            Action::SubjectView => self.ui.subject_view = !self.ui.subject_view,
+            Action::Help => self.ui.help_open = !self.ui.help_open,
+            Action::Quit if self.asked_to_end => {
+                self.forget_question();
+                self.ask(Command::Abort("the person ended it".to_owned()));
+            }
+            Action::Quit => {
+                self.asked_to_end = true;
+                self.ui.message =
+                    Some("q again ends the session; any other key goes on".to_owned());
+            }
+            Action::QuitNow => self.leave(End::Interrupted),
+            _ => {}
+        }
+    }
+
+    fn forget_question(&mut self) {
+        self.asked_to_end = false;
+        self.ui.message = None;
+    }
+
+    fn ask(&mut self, command: Command) {
+        // A session that hears nothing any more is over; its results come next.
+        let _ = self.running.watcher.ask(command);
+    }
+
+    fn faster(&mut self) {
+        let now = self.running.watcher.look().speed;
+        let next = SPEEDS.iter().copied().find(|speed| *speed > now).unwrap_or(SPEEDS[0]);
+        self.ask(Command::Speed(next));
+    }
+
+    /// Ends the session, and then the program.
+    fn leave(&mut self, end: End) {
+        if self.leaving.is_none() {
+            let cause = match end {
+                End::Lost => "the terminal is gone",
+                End::Signal => "a signal arrived",
+                End::Interrupted | End::Quit => "Ctrl-C was pressed",
+            };
+            self.ask(Command::Abort(cause.to_owned()));
+        }
+        self.leaving = Some(end);
+    }
+}

@@ -1,0 +1,260 @@
+//! The terminal: taken over, read by one thread, and always given back.
+
+use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use ratatui::Frame;
+use ratatui::backend::CrosstermBackend;
+use ratatui::crossterm::event::{
+    self, DisableFocusChange, EnableFocusChange, Event, KeyEventKind, KeyboardEnhancementFlags,
+    PopKeyboardEnhancementFlags, PushKeyboardEnhancementFlags,
+};
+use ratatui::crossterm::terminal::{
+    BeginSynchronizedUpdate, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen,
+    disable_raw_mode, enable_raw_mode, supports_keyboard_enhancement,
+};
+use ratatui::crossterm::{cursor, execute, queue};
+
+use super::palette::{Glyphs, Look, Palette};
+use crate::clock::{Clock, WallClock};
+use crate::operator::terminal::Hands;
+use crate::profile;
+
+/// Whether the terminal is ours, so that it is given back exactly once.
+static TAKEN: AtomicBool = AtomicBool::new(false);
+/// Whether it was told to report key releases.
+static REPORTS_RELEASES: AtomicBool = AtomicBool::new(false);
+
+/// Why there is no screen.
+#[derive(Debug, thiserror::Error)]
+pub enum NoScreen {
+    /// Standard input or output is a file or a pipe.
+    #[error(
+        "there is no terminal here (standard {0} is not one): run coadapt in a terminal, or \
+         without a screen: coadapt run balance --headless --operator simulated:average"
+    )]
+    NoTerminal(&'static str),
+    /// The terminal cannot be drawn on.
+    #[error(
+        "the terminal says TERM=dumb and cannot show a screen: use another terminal, or run \
+         without a screen: coadapt run balance --headless --operator simulated:average"
+    )]
+    Dumb,
+    /// The system refused.
+    #[error("the terminal could not be taken over: {0}")]
+    Io(#[from] io::Error),
+}
+
+/// What the reader thread saw.
+#[derive(Debug)]
+pub enum Heard {
+    /// A key, a new size, a paste.
+    Event(Event),
+    /// Nothing for as long as one was ready to wait.
+    Nothing,
+    /// The terminal is gone.
+    Lost,
+}
+
+/// The steering keys that the reader feeds; a session puts its own in place.
+#[derive(Clone, Debug)]
+pub struct Feed {
+    hands: Arc<Mutex<Hands>>,
+    /// The time of key events and ticks.
+    pub clock: WallClock,
+}
+
+impl Feed {
+    /// A feed for `hands`.
+    #[must_use]
+    pub fn new(hands: Hands, clock: WallClock) -> Self {
+        Self { hands: Arc::new(Mutex::new(hands)), clock }
+    }
+
+    /// From now on feeds `hands`, which know of releases what the ones before knew.
+    pub fn replace(&self, hands: Hands) {
+        let mut slot = self.hands.lock().unwrap_or_else(PoisonError::into_inner);
+        hands.set_releases_known(REPORTS_RELEASES.load(Ordering::Relaxed));
+        *slot = hands;
+    }
+
+    /// The hands that are fed now.
+    #[must_use]
+    pub fn hands(&self) -> Hands {
+        self.hands.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn take(&self, event: &Event) {
+        match event {
+            Event::Key(key) => {
+                let hands = self.hands();
+                if key.kind == KeyEventKind::Release {
+                    REPORTS_RELEASES.store(true, Ordering::Relaxed);
+                    hands.set_releases_known(true);
+                }
+                hands.feed(key, self.clock.now());
+            }
+            Event::FocusLost => self.hands().release_all(),
+            _ => {}
+        }
+    }
+}
+
+/// The terminal while it is ours.
+pub struct Screen {
+    terminal: ratatui::Terminal<CrosstermBackend<BufWriter<Stdout>>>,
+    heard: Receiver<Heard>,
+    sender: Option<SyncSender<Heard>>,
+    stop: Arc<AtomicBool>,
+    feed: Feed,
+}
+
+impl Screen {
+    /// Takes the terminal over. Nothing is asked of it yet: the first picture comes first.
+    ///
+    /// # Errors
+    /// When there is none, or it refuses.
+    pub fn take(feed: Feed) -> Result<Self, NoScreen> {
+        if !io::stdin().is_terminal() {
+            return Err(NoScreen::NoTerminal("input"));
+        }
+        if !io::stdout().is_terminal() {
+            return Err(NoScreen::NoTerminal("output"));
+        }
+        if std::env::var("TERM").is_ok_and(|term| term == "dumb") {
+            return Err(NoScreen::Dumb);
+        }
+        enable_raw_mode()?;
+        TAKEN.store(true, Ordering::SeqCst);
+        let mut out = BufWriter::with_capacity(1 << 16, io::stdout());
+        let (sender, heard) = sync_channel(256);
+        let stop = Arc::new(AtomicBool::new(false));
+        let taken = execute!(out, EnterAlternateScreen, cursor::Hide, EnableFocusChange)
+            .and_then(|()| ratatui::Terminal::new(CrosstermBackend::new(out)));
+        match taken {
+            Ok(terminal) => Ok(Self { terminal, heard, sender: Some(sender), stop, feed }),
+            Err(error) => {
+                give_back();
+                Err(error.into())
+            }
+        }
+    }
+
+    /// Draws one frame, as one synchronised update. The keys are read from the first on.
+    ///
+    /// # Errors
+    /// When the terminal is gone.
+    pub fn draw(&mut self, picture: impl FnOnce(&mut Frame<'_>)) -> io::Result<()> {
+        queue!(self.terminal.backend_mut(), BeginSynchronizedUpdate)?;
+        self.terminal.draw(picture)?;
+        execute!(self.terminal.backend_mut(), EndSynchronizedUpdate)?;
+        if let Some(sender) = self.sender.take() {
+            let (feed, stop) = (self.feed.clone(), Arc::clone(&self.stop));
+            std::thread::Builder::new()
+                .name("coadapt-terminal".to_owned())
+                .spawn(move || read(&sender, &feed, &stop))?;
+        }
+        Ok(())
+    }
+
+    /// The next thing heard within `patience`.
+    #[must_use]
+    pub fn hear(&self, patience: Duration) -> Heard {
+        match self.heard.recv_timeout(patience) {
+            Ok(heard) => heard,
+            Err(RecvTimeoutError::Timeout) => Heard::Nothing,
+            Err(RecvTimeoutError::Disconnected) => Heard::Lost,
+        }
+    }
+
+    /// The feed of steering keys.
+    #[must_use]
+    pub const fn feed(&self) -> &Feed {
+        &self.feed
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::SeqCst);
+        give_back();
+    }
+}
+
+/// Gives the terminal back as it was, if it is ours. Every failure is passed over: what can
+/// be undone is undone.
+pub fn give_back() {
+    if !TAKEN.swap(false, Ordering::SeqCst) {
+        return;
+    }
+    let mut out = io::stdout();
+    if REPORTS_RELEASES.load(Ordering::SeqCst) {
+        let _ = execute!(out, PopKeyboardEnhancementFlags);
+    }
+    let _ = execute!(out, DisableFocusChange, EndSynchronizedUpdate, LeaveAlternateScreen);
+    let _ = execute!(out, cursor::Show);
+    let _ = disable_raw_mode();
+    let _ = out.flush();
+}
+
+/// Whether the terminal is ours now.
+#[must_use]
+pub fn is_taken() -> bool {
+    TAKEN.load(Ordering::SeqCst)
+}
+
+/// The one reader of the terminal: feeds the hands at once and passes everything on.
+///
+/// It also asks whether releases can be reported. A terminal that never answers delays the
+/// first keys by that question's time-out, but no picture.
+fn read(sender: &SyncSender<Heard>, feed: &Feed, stop: &AtomicBool) {
+    if supports_keyboard_enhancement().unwrap_or(false) && is_taken() {
+        let flags = KeyboardEnhancementFlags::DISAMBIGUATE_ESCAPE_CODES
+            | KeyboardEnhancementFlags::REPORT_EVENT_TYPES
+            | KeyboardEnhancementFlags::REPORT_ALL_KEYS_AS_ESCAPE_CODES;
+        if execute!(io::stdout(), PushKeyboardEnhancementFlags(flags)).is_ok() {
+            REPORTS_RELEASES.store(true, Ordering::SeqCst);
+            feed.hands().set_releases_known(true);
+        }
+    }
+    while !stop.load(Ordering::SeqCst) {
+        match event::poll(Duration::from_millis(100)).and_then(|ready| {
+            if ready { event::read().map(Some) } else { Ok(None) }
+        }) {
+            Ok(Some(event)) => {
+                feed.take(&event);
+                // A full queue means that nobody looks; hands were fed all the same.
+                let _ = sender.try_send(Heard::Event(event));
+            }
+            Ok(None) => {}
+            Err(_) => {
+                let _ = sender.try_send(Heard::Lost);
+                return;
+            }
+        }
+    }
+}
+
+/// How pictures look here: what the profile asks for, what the environment says.
+#[must_use]
+pub fn look(wanted: profile::Glyphs) -> Look {
+    let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+    let palette = if set("NO_COLOR").is_some() { Palette::Plain } else { Palette::Colours };
+    let locale = set("LC_ALL").or_else(|| set("LC_CTYPE")).or_else(|| set("LANG"));
+    let speaks_unicode = locale.is_some_and(|locale| {
+        let locale = locale.to_ascii_lowercase();
+        locale.contains("utf-8") || locale.contains("utf8")
+    });
+    let is_console = set("TERM").is_some_and(|term| term == "linux");
+    let glyphs = match wanted {
+        profile::Glyphs::Braille => Glyphs::Braille,
+        profile::Glyphs::Half => Glyphs::Half,
+        profile::Glyphs::Ascii => Glyphs::Ascii,
+        profile::Glyphs::Auto if speaks_unicode && !is_console => Glyphs::Braille,
+        profile::Glyphs::Auto => Glyphs::Ascii,
+    };
+    Look { glyphs, palette }
+}
