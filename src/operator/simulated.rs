@@ -11,7 +11,7 @@ use std::fmt;
 use std::str::FromStr;
 
 pub use cart_pole::Simulated;
-pub use params::{BySkill, Params, Practice};
+pub use params::{BySkill, NaiveAverageExpert, Params, Practice};
 
 /// How well an operator steers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
