@@ -134,7 +134,7 @@ impl Default for Params {
             bang_force_n: 3.0,
             bang_threshold_n: 0.6,
             model_length_factor: 1.5,
-            model_noise_factor: (3.0, 2.0),
+            model_noise_factor: (4.0, 4.0),
             travel_s: 1.0,
             lapses_per_s: (1.0, 0.5),
             lapse_s: 0.2,
