@@ -1,6 +1,6 @@
 //! Range checks of parameters, collected instead of stopping at the first.
 
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::ops::RangeInclusive;
 
 /// One value that is not allowed.
@@ -34,7 +34,7 @@ impl<'a> Checker<'a> {
     /// Demands a finite number within `range`.
     pub fn range(&mut self, key: &str, value: f64, range: RangeInclusive<f64>) {
         if !range.contains(&value) {
-            let allowed = format!("{} to {}", range.start(), range.end());
+            let allowed = format!("{} to {}", Short(*range.start()), Short(*range.end()));
             self.refuse(key, value, &allowed);
         }
     }
@@ -63,8 +63,48 @@ impl<'a> Checker<'a> {
     }
 }
 
+/// A number as people write it: 0.05 and 1000, but 1e-6 and 1e15.
+struct Short(f64);
+
+impl Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(value) = self;
+        if *value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
+            write!(f, "{value}")
+        } else {
+            write!(f, "{value:e}")
+        }
+    }
+}
+
 /// Parameters that know their allowed ranges.
 pub trait Check {
     /// Reports every value outside its range.
     fn check(&self, checker: &mut Checker<'_>);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_tells_its_path_its_value_and_the_range() {
+        let mut faults = Vec::new();
+        let mut checker = Checker::new(&mut faults);
+        let mut section = checker.section("plant");
+        section.range("mass_kg", f64::NAN, 0.001..=1000.0);
+        section.range("stiffness", 2e15, 1e-6..=1e15);
+        section.count("substeps", 0, 1..=1_000_000);
+        section.range("bounce", 0.5, 0.0..=1.0);
+        let told: Vec<String> =
+            faults.iter().map(|f| format!("{} {}: {}", f.key, f.value, f.allowed)).collect();
+        assert_eq!(
+            told,
+            [
+                "plant.mass_kg NaN: 0.001 to 1000",
+                "plant.stiffness 2000000000000000: 1e-6 to 1e15",
+                "plant.substeps 0: 1 to 1000000",
+            ]
+        );
+    }
 }

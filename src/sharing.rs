@@ -1,6 +1,6 @@
 //! The heart of the thesis: who has how much of the controls, and how that changes.
 //!
-//! The plant receives u = w·u_h + (1 − w)·u_m (eq. 5, 29). In each region of the state
+//! The plant receives `u = w·u_h + (1 − w)·u_m` (eq. 5, 29). In each region of the state
 //! space the share w of the person follows τẇ = −w + 1 − success (eq. 6–8, 11, 20), where
 //! success is a moving average of a measure of how well the task goes (eq. 9, 19, 28).
 
@@ -37,7 +37,7 @@ impl Mode {
     }
 }
 
-/// The mixed action u = w·u_h + (1 − w)·u_m (eq. 5).
+/// The mixed action `u = w·u_h + (1 − w)·u_m` (eq. 5).
 ///
 /// At w = 1 and w = 0 the other's action has no effect whatever it is.
 #[must_use]

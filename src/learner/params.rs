@@ -7,6 +7,9 @@ use super::rfwr::{InitialMetric, Rfwr, Settings};
 use super::{BuildError, Model};
 use crate::check::{Check, Checker};
 
+/// The most inputs that a profile can name: the task with the most features has 6.
+const MOST_INPUTS: usize = 6;
+
 /// Which learner.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -137,18 +140,119 @@ impl Check for Params {
         c.range("init_alpha", self.init_alpha, 0.0..=1e6);
         c.range("penalty", self.penalty, 0.0..=1.0);
         c.range("w_gen", self.w_gen, 0.001..=0.99);
-        c.range("w_prune", self.w_prune, self.w_gen..=1.0);
+        c.range("w_prune", self.w_prune, 0.001..=1.0);
+        let pruned = self.w_prune;
+        c.demand(pruned >= self.w_gen, "w_prune", pruned, "w_gen or more");
         c.range("init_lambda", self.init_lambda, 0.5..=1.0);
         c.range("final_lambda", self.final_lambda, 0.5..=1.0);
         c.range("tau_lambda", self.tau_lambda, 0.0..=1.0);
         c.range("init_p", self.init_p, 1e-6..=1e15);
         c.range("meta_rate", self.meta_rate, 0.0..=1e6);
-        c.range("d_floor", self.d_floor, 1e-12..=1e6);
-        c.range("d_ceiling", self.d_ceiling, self.d_floor..=1e12);
-        c.range("min_one_minus_h", self.min_one_minus_h, 1e-12..=1.0);
-        for (index, norm) in self.norm_in.iter().enumerate() {
-            c.range(&format!("norm_in[{index}]"), *norm, 1e-9..=1e9);
+        c.range("d_floor", self.d_floor, 1e-6..=1e6);
+        c.range("d_ceiling", self.d_ceiling, 1e-6..=1e9);
+        let ceiling = self.d_ceiling;
+        c.demand(ceiling >= self.d_floor, "d_ceiling", ceiling, "d_floor or more");
+        c.range("min_one_minus_h", self.min_one_minus_h, 1e-6..=1.0);
+        let given = format_args!("a list of {}", self.norm_in.len());
+        let right = (1..=MOST_INPUTS).contains(&self.norm_in.len());
+        c.demand(right, "norm_in", given, "1 to 6 numbers");
+        for norm in &self.norm_in {
+            c.range("norm_in", *norm, 1e-6..=1e6);
         }
-        c.range("norm_out", self.norm_out, 1e-9..=1e9);
+        c.range("norm_out", self.norm_out, 1e-6..=1e6);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(params: &Params) -> Vec<String> {
+        let mut faults = Vec::new();
+        params.check(&mut Checker::new(&mut faults));
+        faults.into_iter().map(|fault| fault.key).collect()
+    }
+
+    #[test]
+    fn the_defaults_pass_and_build() {
+        assert_eq!(refused(&Params::default()), [""; 0]);
+        assert!(Params::default().build(4, 10.0).is_ok());
+    }
+
+    #[test]
+    fn norms_are_positive_finite_and_at_most_6() {
+        let norms = |norm_in: &[f64]| Params { norm_in: norm_in.to_vec(), ..Params::default() };
+        assert_eq!(refused(&norms(&[1.0; 6])), [""; 0]);
+        for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(refused(&norms(&[1.0, wrong])), ["norm_in"], "{wrong}");
+            assert_eq!(refused(&Params { norm_out: wrong, ..Params::default() }), ["norm_out"]);
+        }
+        assert_eq!(refused(&norms(&[1.0; 7])), ["norm_in"]);
+        assert_eq!(refused(&norms(&[])), ["norm_in"]);
+    }
+
+    #[test]
+    fn every_fault_is_named() {
+        let wrong = Params {
+            max_fields: 0,
+            w_gen: 0.5,
+            w_prune: 0.4,
+            tau_lambda: 1.5,
+            init_p: f64::NAN,
+            d_floor: 2.0,
+            d_ceiling: 1.0,
+            ..Params::default()
+        };
+        let keys = ["max_fields", "w_prune", "tau_lambda", "init_p", "d_ceiling"];
+        assert_eq!(refused(&wrong), keys);
+    }
+
+    /// Whatever a profile may say, the learner takes.
+    #[test]
+    fn the_bounds_build() {
+        let (least, most) = (
+            Params {
+                max_fields: 1,
+                init_d: 1e-6,
+                init_alpha: 0.0,
+                penalty: 0.0,
+                w_gen: 0.001,
+                w_prune: 0.001,
+                init_lambda: 0.5,
+                final_lambda: 0.5,
+                tau_lambda: 0.0,
+                init_p: 1e-6,
+                meta_rate: 0.0,
+                d_floor: 1e-6,
+                d_ceiling: 1e-6,
+                min_one_minus_h: 1e-6,
+                norm_in: vec![1e-6],
+                norm_out: 1e-6,
+                ..Params::default()
+            },
+            Params {
+                max_fields: 10_000,
+                init_d: 1e6,
+                init_alpha: 1e6,
+                penalty: 1.0,
+                w_gen: 0.99,
+                w_prune: 1.0,
+                init_lambda: 1.0,
+                final_lambda: 1.0,
+                tau_lambda: 1.0,
+                init_p: 1e15,
+                meta_rate: 1e6,
+                d_floor: 1e6,
+                d_ceiling: 1e9,
+                min_one_minus_h: 1.0,
+                norm_in: vec![1e6; 6],
+                norm_out: 1e6,
+                ..Params::default()
+            },
+        );
+        for params in [least, most] {
+            assert_eq!(refused(&params), [""; 0]);
+            assert!(params.build(params.norm_in.len(), 10.0).is_ok());
+        }
     }
 }

@@ -163,9 +163,10 @@ pub fn transition(plan: &Plan, stage: Stage, event: Event) -> (Stage, Vec<Effect
             (Stage::Stopped(again(moment)), effects)
         }
         (_, Event::Stop) => (stage, vec![Halt]),
-        (Stage::Stopped(moment), Event::Begin) => prepare(plan, moment, vec![]),
 
-        (Stage::Instruction(moment), Event::Begin) => prepare(plan, moment, vec![]),
+        (Stage::Stopped(moment) | Stage::Instruction(moment), Event::Begin) => {
+            prepare(plan, moment, vec![])
+        }
         (Stage::Break { next, .. }, Event::Begin) => (Stage::Instruction(next), vec![]),
         (Stage::Break { next, ticks_left: 0 | 1 }, Event::Tick(_)) => {
             (Stage::Instruction(next), vec![])
@@ -227,16 +228,13 @@ fn step(plan: &Plan, moment: Moment, end: Option<End>) -> (Stage, Vec<Effect>) {
         return prepare(plan, next, effects);
     }
     effects.push(Effect::Leave(moment.phase));
-    match plan.after(moment.phase) {
-        Some(next) => {
-            effects.push(Effect::Enter(next));
-            rest(plan, Moment::start_of(next), effects)
-        }
-        None => {
-            let (stage, finish) = finish(Finish::Complete);
-            effects.extend(finish);
-            (stage, effects)
-        }
+    if let Some(next) = plan.after(moment.phase) {
+        effects.push(Effect::Enter(next));
+        rest(plan, Moment::start_of(next), effects)
+    } else {
+        let (stage, finish) = finish(Finish::Complete);
+        effects.extend(finish);
+        (stage, effects)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Every (stage × event) pair, and what no order of events may do.
 
+use std::fmt::Write as _;
+
 use proptest::prelude::*;
 
 use super::*;
@@ -91,12 +93,9 @@ fn every_stage_in_every_phase_answers_every_event_as_the_table_says() {
         for stage in stages {
             for (name, event) in EVENTS {
                 let (next, effects) = transition(&plan, stage, event);
-                table += &format!(
-                    "{:<24} {name:<8} → {:<24} {}\n",
-                    words(stage),
-                    if next == stage { "·".to_owned() } else { words(next) },
-                    effect_words(&effects),
-                );
+                let becomes = if next == stage { "·".to_owned() } else { words(next) };
+                let (stage, effects) = (words(stage), effect_words(&effects));
+                writeln!(table, "{stage:<24} {name:<8} → {becomes:<24} {effects}").unwrap();
             }
         }
     }
@@ -124,7 +123,7 @@ fn an_unattended_session_runs_through_without_a_person() {
         let (next, effects) = transition(&plan, stage, Event::Tick(end));
         stage = next;
         if !effects.is_empty() {
-            story += &format!("\n{}", effect_words(&effects));
+            write!(story, "\n{}", effect_words(&effects)).unwrap();
         }
     }
     assert_eq!(stage, Stage::Finished(Finish::Complete));

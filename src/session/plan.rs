@@ -159,6 +159,7 @@ impl Check for Params {
 
 /// Where a rollout starts, as the task is asked for it.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "one at a time, made once a rollout and used up")]
 pub enum Start {
     /// At random, from this stream.
     Random(rand_chacha::ChaCha8Rng),

@@ -394,14 +394,16 @@ mod tests {
 
     #[test]
     fn balance_times_are_those_of_people() {
-        let (naive_first, naive_last) = first_and_last_ten(Skill::Naive, Kind::DelayedPd, 8);
-        let (_, average_last) = first_and_last_ten(Skill::Average, Kind::DelayedPd, 8);
-        let (_, expert_last) = first_and_last_ten(Skill::Expert, Kind::DelayedPd, 8);
-        assert!((1.0..2.0).contains(&naive_first), "{naive_first}");
-        assert!((1.4..3.0).contains(&naive_last), "{naive_last}");
-        assert!((3.5..8.0).contains(&expert_last), "{expert_last}");
-        assert!(naive_first < naive_last, "practice helps");
-        assert!(naive_last < average_last && average_last < expert_last, "{average_last}");
+        for kind in [Kind::DelayedPd, Kind::Predictor] {
+            let (naive_first, naive_last) = first_and_last_ten(Skill::Naive, kind, 8);
+            let (_, average_last) = first_and_last_ten(Skill::Average, kind, 8);
+            let (_, expert_last) = first_and_last_ten(Skill::Expert, kind, 8);
+            assert!((1.0..2.0).contains(&naive_first), "{kind}: {naive_first}");
+            assert!((1.5..3.0).contains(&naive_last), "{kind}: {naive_last}");
+            assert!((3.5..8.0).contains(&expert_last), "{kind}: {expert_last}");
+            assert!(naive_first < naive_last, "practice helps");
+            assert!(naive_last < average_last && average_last < expert_last, "{kind}");
+        }
     }
 
     /// The first 400 actions of a rollout with the given seed at `place`.

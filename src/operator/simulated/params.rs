@@ -8,11 +8,13 @@ use crate::check::{Check, Checker};
 /// A value at skill 0 and at skill 1; between and beyond, the line through both.
 pub type BySkill = (f64, f64);
 
+/// A value for each of [`Skill::ALL`].
+pub type NaiveAverageExpert = (f64, f64, f64);
+
 /// How an operator's skill grows, and how much operators differ.
 ///
 /// Skill 0 is a first try, 1 a practised hand; above 1 the values are extrapolated.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Practice {
     /// Skill before the first rollout.
     pub skill_first: f64,
@@ -28,12 +30,14 @@ pub struct Practice {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
-    /// Skill of `simulated:naive`.
-    pub naive: Practice,
-    /// Skill of `simulated:average`.
-    pub average: Practice,
-    /// Skill of `simulated:expert`.
-    pub expert: Practice,
+    /// Skill before the first rollout.
+    pub skill_first: NaiveAverageExpert,
+    /// Skill after endless practice.
+    pub skill_last: NaiveAverageExpert,
+    /// Standard deviation of `skill_last` over operators.
+    pub skill_last_sd: NaiveAverageExpert,
+    /// Factor on the spread of all personal traits.
+    pub trait_spread: NaiveAverageExpert,
     /// Rollouts in which the distance to the last skill shrinks to 1/e.
     pub practice_rollouts: f64,
     /// How old the state is that the operator acts on, s.
@@ -88,11 +92,17 @@ pub struct Params {
 impl Params {
     /// The practice of operators with `skill`.
     #[must_use]
-    pub const fn practice(&self, skill: Skill) -> &Practice {
-        match skill {
-            Skill::Naive => &self.naive,
-            Skill::Average => &self.average,
-            Skill::Expert => &self.expert,
+    pub fn practice(&self, skill: Skill) -> Practice {
+        let of = |(naive, average, expert): NaiveAverageExpert| match skill {
+            Skill::Naive => naive,
+            Skill::Average => average,
+            Skill::Expert => expert,
+        };
+        Practice {
+            skill_first: of(self.skill_first),
+            skill_last: of(self.skill_last),
+            skill_last_sd: of(self.skill_last_sd),
+            trait_spread: of(self.trait_spread),
         }
     }
 }
@@ -100,24 +110,10 @@ impl Params {
 impl Default for Params {
     fn default() -> Self {
         Self {
-            naive: Practice {
-                skill_first: 0.05,
-                skill_last: 0.7,
-                skill_last_sd: 0.1,
-                trait_spread: 1.0,
-            },
-            average: Practice {
-                skill_first: 0.4,
-                skill_last: 0.9,
-                skill_last_sd: 0.1,
-                trait_spread: 1.0,
-            },
-            expert: Practice {
-                skill_first: 1.2,
-                skill_last: 1.2,
-                skill_last_sd: 0.0,
-                trait_spread: 0.5,
-            },
+            skill_first: (0.05, 0.4, 1.2),
+            skill_last: (0.7, 0.9, 1.2),
+            skill_last_sd: (0.1, 0.1, 0.0),
+            trait_spread: (1.0, 1.0, 0.5),
             practice_rollouts: 40.0,
             delay_s: (0.22, 0.18),
             delay_sd_s: 0.015,
@@ -138,7 +134,7 @@ impl Default for Params {
             bang_force_n: 3.0,
             bang_threshold_n: 0.6,
             model_length_factor: 1.5,
-            model_noise_factor: (3.0, 2.0),
+            model_noise_factor: (4.0, 4.0),
             travel_s: 1.0,
             lapses_per_s: (1.0, 0.5),
             lapse_s: 0.2,
@@ -146,20 +142,19 @@ impl Default for Params {
     }
 }
 
-impl Check for Practice {
-    fn check(&self, c: &mut Checker<'_>) {
-        c.range("skill_first", self.skill_first, 0.0..=2.0);
-        c.range("skill_last", self.skill_last, 0.0..=2.0);
-        c.range("skill_last_sd", self.skill_last_sd, 0.0..=0.5);
-        c.range("trait_spread", self.trait_spread, 0.0..=5.0);
-    }
-}
-
 impl Check for Params {
     fn check(&self, c: &mut Checker<'_>) {
-        self.naive.check(&mut c.section("naive"));
-        self.average.check(&mut c.section("average"));
-        self.expert.check(&mut c.section("expert"));
+        let triples = [
+            ("skill_first", self.skill_first, 0.0..=2.0),
+            ("skill_last", self.skill_last, 0.0..=2.0),
+            ("skill_last_sd", self.skill_last_sd, 0.0..=0.5),
+            ("trait_spread", self.trait_spread, 0.0..=5.0),
+        ];
+        for (key, (naive, average, expert), range) in triples {
+            for value in [naive, average, expert] {
+                c.range(key, value, range.clone());
+            }
+        }
         c.range("practice_rollouts", self.practice_rollouts, 0.1..=10_000.0);
         c.range("delay_sd_s", self.delay_sd_s, 0.0..=0.2);
         c.range("noise_correlation_s", self.noise_correlation_s, 0.0..=10.0);
@@ -187,8 +182,8 @@ impl Check for Params {
             ("lapses_per_s", self.lapses_per_s, 0.0..=100.0),
         ];
         for (key, (first, second), range) in pairs {
-            c.range(&format!("{key}.0"), first, range.clone());
-            c.range(&format!("{key}.1"), second, range);
+            c.range(key, first, range.clone());
+            c.range(key, second, range);
         }
         c.demand(
             self.decision_hold_s.0 <= self.decision_hold_s.1,
@@ -208,11 +203,15 @@ mod tests {
         let mut faults = Vec::new();
         Params::default().check(&mut Checker::new(&mut faults));
         assert_eq!(faults, []);
-        let mut wrong = Params { lag_s: f64::NAN, delay_s: (0.2, -1.0), ..Params::default() };
-        wrong.naive.skill_first = 9.0;
+        let wrong = Params {
+            skill_first: (9.0, 0.4, 1.2),
+            lag_s: f64::NAN,
+            delay_s: (0.2, -1.0),
+            ..Params::default()
+        };
         wrong.check(&mut Checker::new(&mut faults));
         let keys: Vec<&str> = faults.iter().map(|fault| &fault.key[..]).collect();
-        assert_eq!(keys, ["naive.skill_first", "lag_s", "delay_s.1"]);
+        assert_eq!(keys, ["skill_first", "lag_s", "delay_s"]);
     }
 
     #[test]
