@@ -1,6 +1,7 @@
 //! The composition root: the one room that knows every other.
 
 pub mod outcome;
+mod screen;
 pub mod session;
 mod shutdown;
 mod words;
@@ -55,17 +56,13 @@ pub fn run() -> ExitCode {
 
 fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
     match &cli.command {
-        None => screen(None),
+        None => screen::screen(None),
         Some(Command::Run(run)) if run.headless => headless(run),
-        Some(Command::Run(run)) => screen(Some(run)),
+        Some(Command::Run(run)) => screen::screen(Some(run)),
         Some(Command::Evaluate(evaluate)) => words::evaluate(evaluate),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::Profile(profile)) => words::profile(profile),
     }
-}
-
-fn screen(_run: Option<&crate::cli::Run>) -> Result<ExitCode, RunError> {
-    Err(RunError::Failed("no screen yet".to_owned()))
 }
 
 /// A whole session on virtual time.

@@ -8,6 +8,7 @@
 //! What is said by colour is also said by a word or a shape, and every number has a fixed
 //! place and a fixed width: what moves on the screen is what moves in the experiment.
 
+pub mod app;
 pub mod briefing;
 pub mod canvas;
 pub mod help;
@@ -18,4 +19,5 @@ pub mod pen;
 pub mod results;
 pub mod scene;
 pub mod small;
+pub mod terminal;
 pub mod text;

@@ -120,6 +120,12 @@ impl Hands {
         self.hold().last_event()
     }
 
+    /// The push at `now`, −1 to 1.
+    #[must_use]
+    pub fn push(&self, now: Seconds) -> f64 {
+        self.hold().push(now)
+    }
+
     /// The keys' state stays whole even if a thread died holding it.
     fn hold(&self) -> MutexGuard<'_, Hold> {
         self.hold.lock().unwrap_or_else(PoisonError::into_inner)

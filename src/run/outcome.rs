@@ -58,6 +58,27 @@ pub struct Results {
     pub phases: Phases,
 }
 
+impl Results {
+    /// The session in a line.
+    #[must_use]
+    pub fn title(&self) -> String {
+        let Self { task, mode, learner, preset, subject, trial, .. } = self;
+        format!("{task} · {mode} · {learner} · {preset}   {subject} trial {trial:03}")
+    }
+
+    /// How it ended, a word.
+    #[must_use]
+    pub const fn status_word(&self) -> &'static str {
+        match self.status {
+            Status::Running => "running",
+            Status::Complete => "complete",
+            Status::Aborted => "ended early",
+            Status::Interrupted => "interrupted",
+            Status::Failed => "failed",
+        }
+    }
+}
+
 /// Evaluates, measures and writes the last files.
 pub(super) fn conclude(
     profile: Profile,

@@ -48,6 +48,14 @@ impl Shutdown {
         *self.sessions.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(session);
     }
 
+    /// Ends the watched session, if it still runs.
+    pub fn abort_now(&self, cause: &str) {
+        let session = self.sessions.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(session) = &*session {
+            session.ask(Command::Abort(cause.to_owned()));
+        }
+    }
+
     fn hear(&self, signal: i32) {
         self.signal.store(signal, Ordering::SeqCst);
         let session = self.sessions.lock().unwrap_or_else(std::sync::PoisonError::into_inner);

@@ -113,11 +113,11 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// Takes the terminal over. Nothing is asked of it yet: the first picture comes first.
+    /// Whether there is a terminal to take over.
     ///
     /// # Errors
-    /// When there is none, or it refuses.
-    pub fn take(feed: Feed) -> Result<Self, NoScreen> {
+    /// When there is none, or none that can be drawn on.
+    pub fn check() -> Result<(), NoScreen> {
         if !io::stdin().is_terminal() {
             return Err(NoScreen::NoTerminal("input"));
         }
@@ -127,6 +127,15 @@ impl Screen {
         if std::env::var("TERM").is_ok_and(|term| term == "dumb") {
             return Err(NoScreen::Dumb);
         }
+        Ok(())
+    }
+
+    /// Takes the terminal over. Nothing is asked of it yet: the first picture comes first.
+    ///
+    /// # Errors
+    /// When there is none, or it refuses.
+    pub fn take(feed: Feed) -> Result<Self, NoScreen> {
+        Self::check()?;
         enable_raw_mode()?;
         TAKEN.store(true, Ordering::SeqCst);
         let mut out = BufWriter::with_capacity(1 << 16, io::stdout());

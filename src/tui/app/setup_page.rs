@@ -6,10 +6,10 @@ use std::time::Duration;
 use ratatui::crossterm::event::Event;
 
 use super::{Conductor, End, Next, Running, hear};
-use crate::clock::{Clock, WallClock};
+use crate::clock::Clock;
 use crate::profile::Order;
 use crate::tui::keys::Screen as Keys;
-use crate::tui::palette::{Look, Role};
+use crate::tui::palette::Look;
 use crate::tui::pen::Pen;
 use crate::tui::setup::{self, Extras, Reaction, Setup, Shelf};
 use crate::tui::terminal::{Screen, look};
@@ -31,7 +31,7 @@ pub(super) fn show(
     let setup = Setup::new(order, &document, PathBuf::from(PROFILES))
         .map_err(|report| report.to_string())?;
     let clock = screen.feed().clock;
-    let mut page = Page { setup, shelf, help_open: false, clock };
+    let mut page = Page { setup, shelf, help_open: false };
     loop {
         let look = look(page.setup.profile().screen.glyphs);
         let hands = screen.feed().hands();
@@ -65,7 +65,6 @@ pub(super) fn show(
 fn draw_help(frame: &mut ratatui::Frame<'_>, look: Look) {
     let area = frame.area();
     let mut pen = Pen::new(frame.buffer_mut(), area, look);
-    let _ = Role::Text;
     help::draw(&mut pen, Keys::Setup, &[]);
     look.finish(frame.buffer_mut());
 }
@@ -74,7 +73,6 @@ struct Page {
     setup: Setup,
     shelf: Shelf,
     help_open: bool,
-    clock: WallClock,
 }
 
 impl Page {
@@ -114,7 +112,6 @@ impl Page {
     }
 
     fn start(&mut self, started: Result<Running, String>) -> Option<Next> {
-        let _ = self.clock;
         match started {
             Ok(running) => Some(Next::Live(Box::new(running))),
             Err(message) => {

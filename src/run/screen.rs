@@ -1,0 +1,270 @@
+//! Sessions on the screen: starts them, waits for them, and tells what happened after the
+//! terminal was given back.
+
+use std::panic::{self, AssertUnwindSafe};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::{Mutex, PoisonError};
+use std::thread::JoinHandle;
+
+use super::outcome::Finished;
+use super::session::{Company, Keys, Session};
+use super::shutdown::Shutdown;
+use super::{RunError, exit_code, sentences, tell};
+use crate::cli;
+use crate::clock::WallClock;
+use crate::operator::terminal::{self, Hands};
+use crate::profile::{self, Document, Experiment, Order, ProfileError};
+use crate::record::folder;
+use crate::session::Phase;
+use crate::session::plan::Plan;
+use crate::sharing::Mode;
+use crate::tui::app::{self, Conductor, End, Running, Start};
+use crate::tui::live::{Info, SceneInfo};
+use crate::tui::results;
+use crate::tui::scene::cart_pole::Geometry;
+use crate::tui::setup::Shelf;
+use crate::tui::terminal::{Feed, Screen, give_back, is_taken};
+
+/// The folder of local profiles.
+const PROFILES: &str = "profiles";
+
+/// What a panic said while the screen was up, kept until the terminal is given back.
+static LAST_WORDS: Mutex<Option<String>> = Mutex::new(None);
+
+/// Opens the set-up screen, or the session that the command line asks for.
+pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
+    let clock = WallClock::start();
+    let feed = Feed::new(Hands::new(&terminal::Params::default()), clock);
+    let mut stage = Stage { feed: feed.clone(), shutdown: Shutdown::listen(), running: None, last: None };
+    // Everything that could be refused is refused before the screen is taken.
+    let start = match run {
+        None => Start::Setup(Box::default()),
+        Some(run) => {
+            // Without a terminal no folder is made.
+            Screen::check().map_err(|error| RunError::Usage(error.to_string()))?;
+            let started = match &run.resume {
+                Some(folder) => stage.take_up(folder)?,
+                None => stage.start(&run.order())?,
+            };
+            Start::Live(Box::new(started))
+        }
+    };
+    keep_panics_off_the_screen();
+    let mut screen = Screen::take(feed).map_err(|error| RunError::Usage(error.to_string()))?;
+    let ended = panic::catch_unwind(AssertUnwindSafe(|| app::run(&mut screen, &mut stage, start)));
+    // The plant first, then the log, then the terminal, then words.
+    stage.stop();
+    drop(screen);
+    give_back();
+    if let Some(words) = LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        tell(&words);
+    }
+    let ended = match ended {
+        Ok(ended) => ended.map_err(RunError::Failed)?,
+        Err(_) => {
+            return Err(RunError::Failed(
+                "the screen failed; the session up to then is kept and can be resumed".to_owned(),
+            ));
+        }
+    };
+    if let Some(finished) = &stage.last {
+        tell(&sentences(finished).join("\n"));
+    }
+    let signal = stage.shutdown.signal();
+    Ok(match (ended, &stage.last) {
+        (End::Interrupted, _) => ExitCode::from(130),
+        (End::Signal, _) if let Some(signal) = signal => {
+            ExitCode::from(128_u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
+        }
+        (End::Lost, _) => ExitCode::from(129),
+        (_, Some(finished)) => exit_code(finished),
+        (_, None) => ExitCode::SUCCESS,
+    })
+}
+
+/// A panic may say its words only after the terminal was given back.
+fn keep_panics_off_the_screen() {
+    let previous = panic::take_hook();
+    panic::set_hook(Box::new(move |info| {
+        if is_taken() {
+            let name = std::thread::current().name().unwrap_or("unnamed").to_owned();
+            let words = format!("the thread {name} panicked: {info}");
+            *LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner) = Some(words);
+        } else {
+            previous(info);
+        }
+    }));
+}
+
+/// The conductor of the screens.
+struct Stage {
+    feed: Feed,
+    shutdown: Shutdown,
+    running: Option<JoinHandle<Result<Finished, RunError>>>,
+    last: Option<Finished>,
+}
+
+impl Stage {
+    fn start(&mut self, order: &Order) -> Result<Running, RunError> {
+        let hands = Hands::new(&super::session::profile_of(order)?.operator.keyboard);
+        let session = Session::begin(order, self.company(&hands))?;
+        self.raise_curtain(session, hands)
+    }
+
+    fn take_up(&mut self, folder: &Path) -> Result<Running, RunError> {
+        let hands = Hands::new(&terminal::Params::default());
+        let session = Session::resume(folder, self.company(&hands))?;
+        self.raise_curtain(session, hands)
+    }
+
+    fn company(&self, hands: &Hands) -> Company {
+        Company::Attended(Keys { hands: hands.clone(), clock: self.feed.clock })
+    }
+
+    fn raise_curtain(&mut self, session: Session, hands: Hands) -> Result<Running, RunError> {
+        self.feed.replace(hands);
+        let running = Running {
+            info: info(&session),
+            watcher: session.watcher.clone(),
+            frames: session.frames.clone(),
+            screen: session.profile().screen.clone(),
+        };
+        self.shutdown.abort_on_signal(running.watcher.clone());
+        self.last = None;
+        let shutdown = self.shutdown.clone();
+        let mut clock = self.feed.clock;
+        let control = std::thread::Builder::new()
+            .name("coadapt-control".to_owned())
+            .spawn(move || session.run(&mut clock, || shutdown.signal()))
+            .map_err(|error| RunError::Failed(format!("no control thread: {error}")))?;
+        self.running = Some(control);
+        Ok(running)
+    }
+
+    /// Ends a session that still runs and waits for its last file.
+    fn stop(&mut self) {
+        self.shutdown.abort_now("the screen ended");
+        if let Some(control) = self.running.take()
+            && let Ok(Ok(finished)) = control.join()
+        {
+            self.last = Some(finished);
+        }
+    }
+}
+
+impl Conductor for Stage {
+    fn shelf(&mut self, order: &Order) -> Shelf {
+        let kept = folder::trials(&order.logs, &order.subject).unwrap_or_default();
+        let policies = kept
+            .iter()
+            .map(|kept| kept.path.join("policy.json"))
+            .filter(|path| path.is_file())
+            .map(|path| path.display().to_string())
+            .collect();
+        Shelf {
+            trials: kept.iter().map(|kept| kept.trial.0).collect(),
+            unfinished: folder::unfinished(&order.logs),
+            policies,
+            profiles: profile::list(Path::new(PROFILES)),
+        }
+    }
+
+    fn document(&mut self, name: &str) -> Result<Document, ProfileError> {
+        Document::find(name, Path::new(PROFILES))
+    }
+
+    fn begin(&mut self, order: &Order) -> Result<Running, String> {
+        self.start(order).map_err(|error| error.to_string())
+    }
+
+    fn resume(&mut self, folder: &Path) -> Result<Running, String> {
+        self.take_up(folder).map_err(|error| error.to_string())
+    }
+
+    fn results(&mut self) -> Option<Result<results::Info, String>> {
+        if !self.running.as_ref()?.is_finished() {
+            return None;
+        }
+        Some(match self.running.take()?.join() {
+            Ok(Ok(finished)) => {
+                let info = results_info(&finished);
+                self.last = Some(finished);
+                Ok(info)
+            }
+            Ok(Err(error)) => Err(error.to_string()),
+            Err(_) => Err("the control thread failed; the plant is stopped, and the session up \
+                           to then is kept and can be resumed"
+                .to_owned()),
+        })
+    }
+
+    fn is_told_to_end(&self) -> bool {
+        self.shutdown.signal().is_some()
+    }
+}
+
+/// The facts of a session for the live screen.
+fn info(session: &Session) -> Info {
+    let (profile, sidecar) = (session.profile(), session.sidecar());
+    let task = profile.experiment.task(profile.tick());
+    let plan = Plan::new(&profile.session, profile.tick(), sidecar.seed, true);
+    let texts = &profile.session.instructions;
+    let main = match sidecar.mode {
+        Mode::Simultaneous => &texts.simultaneous,
+        Mode::Sequential => &texts.sequential,
+    };
+    let Experiment::Balance { plant, rules } = &profile.experiment;
+    Info {
+        task: sidecar.task.clone(),
+        preset: sidecar.preset.clone(),
+        mode: sidecar.mode.word().to_owned(),
+        robot_watches: sidecar.mode == Mode::Sequential,
+        learner: sidecar.learner.clone(),
+        subject: sidecar.subject.to_string(),
+        trial: sidecar.trial.0,
+        phases: plan.phases,
+        instructions: vec![
+            (Phase::Introduction, texts.introduction.clone()),
+            (Phase::Main, main.clone()),
+            (Phase::Autonomous, texts.autonomous.clone()),
+        ],
+        tick_s: profile.tick().0,
+        hold_s: profile.session.hold_s,
+        autonomous_hold_s: profile.session.autonomous_hold_s,
+        break_s: profile.session.break_s,
+        gate: profile.sharing.gate,
+        action_limit: task.action_limit(),
+        action_unit: "N".to_owned(),
+        scene: SceneInfo::CartPole(Geometry {
+            pole_length_m: plant.pole_length_m,
+            track_length_m: plant.track_length_m,
+            fail_angle_rad: rules.fail_deg.to_radians(),
+        }),
+        field_cap: profile.learner.max_fields,
+        operator: sidecar.operator.clone(),
+    }
+}
+
+/// A finished session for the results screen.
+fn results_info(finished: &Finished) -> results::Info {
+    let results = &finished.results;
+    let mut files: Vec<String> = std::fs::read_dir(&finished.folder)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    files.sort();
+    let mut summary = results.phases.sentences();
+    summary.extend(finished.cause.as_ref().map(|cause| format!("ended early: {cause}")));
+    results::Info {
+        title: results.title(),
+        finish: results.status_word().to_owned(),
+        rollouts: finished.episodes.clone(),
+        folder: PathBuf::from(&finished.folder).display().to_string(),
+        files,
+        summary,
+        evaluation: (!finished.tenths.is_empty()).then(|| finished.tenths.clone()),
+    }
+}
