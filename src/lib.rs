@@ -17,3 +17,4 @@ pub mod sharing;
 pub mod signal;
 pub mod task;
 pub mod teaching;
+pub mod tui;

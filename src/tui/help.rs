@@ -1,0 +1,49 @@
+//! The keys and the few facts that the screen has no room for.
+
+use super::keys::{self, Screen};
+use super::palette::Role;
+use super::pen::{Pen, columns};
+use super::text::wrapped;
+
+/// The width of the page, its border included.
+const WIDTH: u16 = 72;
+
+/// Draws the keys of `screen` and `notes` over what is there.
+pub fn draw(pen: &mut Pen<'_>, screen: Screen, notes: &[String]) {
+    let bindings: Vec<_> = keys::of(screen).collect();
+    let width = WIDTH.min(pen.width());
+    let lines: Vec<String> =
+        notes.iter().flat_map(|note| wrapped(note, usize::from(width.saturating_sub(4)))).collect();
+    let rows = bindings.len() + 1 + usize::from(!lines.is_empty()) + lines.len();
+    let height = u16::try_from(rows + 2).unwrap_or(u16::MAX).min(pen.height());
+    let (x, y) = ((pen.width() - width) / 2, (pen.height() - height) / 2);
+    let title = format!("keys: {}", screen.word());
+    let mut page = pen.part(x, y, width, height);
+    let mut page = page.boxed(&title, Role::Strong);
+    let shown = bindings.iter().map(|b| columns(b.shown)).max().unwrap_or(0).max(6);
+    let mut y = 0;
+    for binding in bindings {
+        page.text(0, y, binding.shown, Role::Strong);
+        page.text(shown + 3, y, binding.help, Role::Text);
+        y += 1;
+    }
+    page.text(0, y, "Ctrl-C", Role::Strong);
+    page.text(shown + 3, y, "stop, save and quit", Role::Text);
+    y += 2;
+    for line in lines {
+        page.text(0, y, &line, Role::Dim);
+        y += 1;
+    }
+}
+
+/// The line of keys at the bottom of a screen.
+pub fn hints(pen: &mut Pen<'_>, y: u16, screen: Screen) {
+    let mut x = 1;
+    for (key, word) in keys::hints(screen) {
+        if x + columns(key) + 1 + columns(word) > pen.width() {
+            break;
+        }
+        x = pen.text(x, y, key, Role::Strong);
+        x = pen.text(x + 1, y, word, Role::Dim) + 3;
+    }
+}

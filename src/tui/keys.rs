@@ -1,0 +1,232 @@
+//! The keys: one table that both obeys and explains them.
+
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+
+/// Where a key is pressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Screen {
+    /// Choosing a session.
+    Setup,
+    /// Reading an instruction, or having a break.
+    Briefing,
+    /// A session under way.
+    Live,
+    /// A session's results.
+    Results,
+}
+
+impl Screen {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Setup, Self::Briefing, Self::Live, Self::Results];
+
+    /// The heading in the help.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Setup => "set-up",
+            Self::Briefing => "instruction and break",
+            Self::Live => "live",
+            Self::Results => "results",
+        }
+    }
+}
+
+/// What a key asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// To the next thing: field, page.
+    Next,
+    /// To the one before.
+    Previous,
+    /// The value to the left; less.
+    Left,
+    /// The value to the right; more.
+    Right,
+    /// Begin, or go on.
+    Begin,
+    /// Read a profile.
+    Open,
+    /// Write a profile.
+    Save,
+    /// Try the controls without a session.
+    TryHands,
+    /// Go on with a session that was cut off.
+    Resume,
+    /// Emergency stop.
+    Stop,
+    /// Pause, or go on.
+    Pause,
+    /// Throw the rollout away.
+    Discard,
+    /// Run faster than the wall where nobody steers.
+    Faster,
+    /// Show or hide share and success.
+    Progress,
+    /// Show the scene only, or everything.
+    SubjectView,
+    /// Show or hide the keys.
+    Help,
+    /// Leave; asked once more during a session.
+    Quit,
+    /// Leave at once.
+    QuitNow,
+}
+
+/// What one or more keys do on a screen.
+#[derive(Clone, Copy, Debug)]
+pub struct Binding {
+    /// Where.
+    pub screen: Screen,
+    /// Which keys; empty for keys that another part takes, listed for the help only.
+    pub keys: &'static [KeyCode],
+    /// The keys in words.
+    pub shown: &'static str,
+    /// What they do, for the help.
+    pub help: &'static str,
+    /// What they do, for the line of keys; empty: not in that line.
+    pub hint: &'static str,
+    /// What they ask for.
+    pub action: Option<Action>,
+}
+
+const fn bind(
+    screen: Screen,
+    keys: &'static [KeyCode],
+    shown: &'static str,
+    hint: &'static str,
+    help: &'static str,
+    action: Action,
+) -> Binding {
+    Binding { screen, keys, shown, help, hint, action: Some(action) }
+}
+
+const fn elsewhere(
+    screen: Screen,
+    shown: &'static str,
+    hint: &'static str,
+    help: &'static str,
+) -> Binding {
+    Binding { screen, keys: &[], shown, help, hint, action: None }
+}
+
+/// All keys of all screens. `Ctrl-C` is [`Action::QuitNow`] everywhere.
+pub const BINDINGS: &[Binding] = {
+    use Action as A;
+    use KeyCode::{BackTab, Char, Down, Enter, Esc, F, Left, Right, Tab, Up};
+    use Screen::{Briefing, Live, Results, Setup};
+    &[
+        bind(Setup, &[Tab, Down], "Tab ↓", "next", "to the next field", A::Next),
+        bind(Setup, &[BackTab, Up], "Shift-Tab ↑", "", "to the field before", A::Previous),
+        bind(Setup, &[Left], "←", "", "the choice before; less", A::Left),
+        bind(Setup, &[Right], "→", "", "the next choice; more", A::Right),
+        bind(Setup, &[Enter], "Enter", "begin", "begin the session", A::Begin),
+        bind(Setup, &[Char('o')], "o", "open", "open a profile", A::Open),
+        bind(Setup, &[Char('s')], "s", "save", "save these settings as a profile", A::Save),
+        bind(Setup, &[Char('t')], "t", "try", "try your hands; nothing is recorded", A::TryHands),
+        bind(Setup, &[Char('r')], "r", "resume", "resume the session that was cut off", A::Resume),
+        elsewhere(Setup, "letters", "", "type in a text field; Tab or Esc leaves it"),
+        bind(Setup, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
+        bind(Setup, &[Char('q'), Esc], "q", "quit", "quit", A::Quit),
+        //
+        bind(Briefing, &[Enter, Char(' ')], "Enter", "go on", "read, rested: go on", A::Begin),
+        bind(Briefing, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
+        bind(Briefing, &[Char('q')], "q", "end", "end the session (asks once)", A::Quit),
+        //
+        elsewhere(Live, "← →", "push", "push the cart while held; also h l and a d"),
+        bind(Live, &[Char(' ')], "space", "stop", "emergency stop, until Enter", A::Stop),
+        bind(Live, &[Enter], "Enter", "", "go on after a stop or a pause", A::Begin),
+        bind(Live, &[Char('P'), Esc], "P Esc", "pause", "pause, or go on", A::Pause),
+        bind(Live, &[Char('x')], "x", "discard", "throw this rollout away, repeat it", A::Discard),
+        bind(Live, &[Char('f')], "f", "", "faster while nobody steers: 1 4 16× max", A::Faster),
+        bind(Live, &[Char('p')], "p", "progress", "show or hide share and success", A::Progress),
+        bind(Live, &[Char('v')], "v", "subject", "the subject's view, or all", A::SubjectView),
+        bind(Live, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
+        bind(Live, &[Char('q')], "q", "end", "end the session (asks once)", A::Quit),
+        //
+        bind(Results, &[Right, Tab, Char('l')], "→ Tab", "next page", "next page", A::Next),
+        bind(Results, &[Left, BackTab, Char('h')], "←", "", "the page before", A::Previous),
+        bind(Results, &[Enter], "Enter", "new session", "back to the set-up", A::Begin),
+        bind(Results, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
+        bind(Results, &[Char('q'), Esc], "q", "quit", "quit", A::Quit),
+    ]
+};
+
+/// What `event` asks for on `screen`.
+#[must_use]
+pub fn action(screen: Screen, event: KeyEvent) -> Option<Action> {
+    if event.kind == KeyEventKind::Release {
+        return None;
+    }
+    if event.modifiers.intersects(KeyModifiers::CONTROL | KeyModifiers::ALT) {
+        let is_ctrl_c =
+            event.code == KeyCode::Char('c') && event.modifiers.contains(KeyModifiers::CONTROL);
+        return is_ctrl_c.then_some(Action::QuitNow);
+    }
+    let code = match event.code {
+        // Terminals that tell keys apart say Shift and the small letter.
+        KeyCode::Char(letter) if event.modifiers.contains(KeyModifiers::SHIFT) => {
+            KeyCode::Char(letter.to_ascii_uppercase())
+        }
+        KeyCode::Tab if event.modifiers.contains(KeyModifiers::SHIFT) => KeyCode::BackTab,
+        code => code,
+    };
+    let found = of(screen).find(|binding| binding.keys.contains(&code))?.action?;
+    // Held keys repeat; only what is harmless to do often follows them.
+    let repeats = matches!(found, Action::Next | Action::Previous | Action::Left | Action::Right);
+    (event.kind == KeyEventKind::Press || repeats).then_some(found)
+}
+
+/// The bindings of `screen`.
+pub fn of(screen: Screen) -> impl Iterator<Item = &'static Binding> {
+    BINDINGS.iter().filter(move |binding| binding.screen == screen)
+}
+
+/// The line of keys at the bottom of `screen`: pairs of key and word.
+pub fn hints(screen: Screen) -> impl Iterator<Item = (&'static str, &'static str)> {
+    of(screen).filter(|b| !b.hint.is_empty()).map(|b| (b.shown, b.hint))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_has_two_meanings_on_a_screen_and_none_is_a_steering_key() {
+        for screen in Screen::ALL {
+            let mut seen = Vec::new();
+            for key in of(screen).flat_map(|binding| binding.keys) {
+                assert!(!seen.contains(key), "{key} twice on {}", screen.word());
+                seen.push(*key);
+            }
+            assert!(of(screen).any(|b| b.action == Some(Action::Help)), "{}", screen.word());
+            assert!(of(screen).any(|b| b.action == Some(Action::Quit)), "{}", screen.word());
+        }
+        for steering in
+            ["hlad".chars().map(KeyCode::Char).collect(), vec![KeyCode::Left, KeyCode::Right]]
+                .concat()
+        {
+            assert!(of(Screen::Live).all(|binding| !binding.keys.contains(&steering)));
+        }
+    }
+
+    #[test]
+    fn keys_act_on_press_and_only_moves_repeat() {
+        let press = |code| KeyEvent::new(code, KeyModifiers::NONE);
+        let with = |code, kind| KeyEvent { kind, ..press(code) };
+        assert_eq!(action(Screen::Live, press(KeyCode::Char(' '))), Some(Action::Stop));
+        assert_eq!(action(Screen::Live, press(KeyCode::Char('p'))), Some(Action::Progress));
+        assert_eq!(action(Screen::Live, press(KeyCode::Char('P'))), Some(Action::Pause));
+        let shifted = KeyEvent::new(KeyCode::Char('p'), KeyModifiers::SHIFT);
+        assert_eq!(action(Screen::Live, shifted), Some(Action::Pause));
+        assert_eq!(action(Screen::Live, press(KeyCode::Char('d'))), None);
+        for kind in [KeyEventKind::Release, KeyEventKind::Repeat] {
+            assert_eq!(action(Screen::Live, with(KeyCode::Char('v'), kind)), None);
+        }
+        let held = with(KeyCode::Tab, KeyEventKind::Repeat);
+        assert_eq!(action(Screen::Setup, held), Some(Action::Next));
+        for screen in Screen::ALL {
+            let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+            assert_eq!(action(screen, ctrl_c), Some(Action::QuitNow));
+        }
+    }
+}

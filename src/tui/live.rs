@@ -1,0 +1,313 @@
+//! The live screen: the plant at a glance, the session's state in fixed places below it.
+
+mod overlay;
+mod panels;
+pub mod strip;
+
+use ratatui::Frame;
+
+use super::keys::Screen;
+use super::palette::{Look, Role};
+use super::pen::Pen;
+use super::scene::{Light, cart_pole};
+use super::{briefing, help, small};
+use crate::control::snapshot::Snapshot;
+use crate::record::EpisodeRow;
+use crate::session::Phase;
+use crate::session::machine::{Finish, Stage};
+use crate::session::plan::PhasePlan;
+use crate::signal::End;
+
+/// What picture belongs to the plant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SceneInfo {
+    /// A cart-pole.
+    CartPole(cart_pole::Geometry),
+}
+
+/// What stays the same during a session.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Info {
+    /// The task's name.
+    pub task: String,
+    /// The profile's preset.
+    pub preset: String,
+    /// The mode's word.
+    pub mode: String,
+    /// Whether the robot only watches in main (sequential mode).
+    pub robot_watches: bool,
+    /// The learner's name.
+    pub learner: String,
+    /// The subject's identifier.
+    pub subject: String,
+    /// The trial's number.
+    pub trial: u32,
+    /// The phases in order.
+    pub phases: Vec<PhasePlan>,
+    /// What a person is told before each phase; missing ones are empty.
+    pub instructions: Vec<(Phase, String)>,
+    /// The control tick, s.
+    pub tick_s: f64,
+    /// The countdown before a steered rollout, s.
+    pub hold_s: f64,
+    /// The countdown before a rollout that nobody steers, s.
+    pub autonomous_hold_s: f64,
+    /// The break between phases, s.
+    pub break_s: f64,
+    /// The success at which the robot begins to take over.
+    pub gate: f64,
+    /// The largest action.
+    pub action_limit: f64,
+    /// The action's unit, one or two characters.
+    pub action_unit: String,
+    /// The picture.
+    pub scene: SceneInfo,
+    /// The most receptive fields.
+    pub field_cap: u32,
+    /// The operator and how it is known, such as "keyboard, releases reported".
+    pub operator: String,
+}
+
+impl Info {
+    /// What a person is told before `phase`.
+    #[must_use]
+    pub fn instruction(&self, phase: Phase) -> &str {
+        self.instructions.iter().find(|(of, _)| *of == phase).map_or("", |(_, text)| text)
+    }
+
+    /// The plan of `phase`, if it takes place.
+    #[must_use]
+    pub fn phase(&self, phase: Phase) -> Option<&PhasePlan> {
+        self.phases.iter().find(|plan| plan.phase == phase)
+    }
+
+    /// How many rollouts `phase` has, when that is what ends it.
+    #[must_use]
+    pub fn rollouts(&self, phase: Phase) -> Option<u32> {
+        self.phase(phase).and_then(|plan| plan.rollouts)
+    }
+}
+
+/// What happened in the session so far.
+#[derive(Clone, Debug, Default)]
+pub struct History {
+    /// The rollouts that ended.
+    pub rollouts: Vec<EpisodeRow>,
+    /// Success, sampled now and then, oldest first.
+    pub success: Vec<f64>,
+}
+
+impl History {
+    /// The durations of the rollouts of `phase` that count, s.
+    #[must_use]
+    pub fn durations(&self, phase: Phase) -> Vec<f64> {
+        self.rollouts
+            .iter()
+            .filter(|row| row.phase == phase && counts(row))
+            .map(|row| row.duration_s)
+            .collect()
+    }
+}
+
+/// Whether a rollout came to its own end.
+#[must_use]
+pub const fn counts(row: &EpisodeRow) -> bool {
+    !matches!(row.end, End::Discarded | End::Aborted)
+}
+
+/// The state of the screen itself.
+#[derive(Clone, Debug)]
+pub struct Ui {
+    /// Whether share and success are shown.
+    pub show_progress: bool,
+    /// Whether only the scene is shown.
+    pub subject_view: bool,
+    /// Whether the keys are shown.
+    pub help_open: bool,
+    /// A word to the person, in place of the line of keys.
+    pub message: Option<String>,
+    /// Glyphs and colours.
+    pub look: Look,
+}
+
+impl Default for Ui {
+    fn default() -> Self {
+        Self {
+            show_progress: true,
+            subject_view: false,
+            help_open: false,
+            message: None,
+            look: Look::default(),
+        }
+    }
+}
+
+/// All that one picture shows.
+///
+/// The scene is drawn from the latest snapshot; numbers from one that is refreshed about
+/// ten times a second, so that they can be read.
+#[derive(Clone, Copy)]
+pub struct View<'a> {
+    /// What stays the same.
+    pub info: &'a Info,
+    /// The latest snapshot, for what moves.
+    pub scene: &'a Snapshot,
+    /// A calmer one, for what is read.
+    pub panel: &'a Snapshot,
+    /// What happened so far.
+    pub history: &'a History,
+    /// The state of the screen.
+    pub ui: &'a Ui,
+}
+
+impl View<'_> {
+    /// The phase that the session is at; the plan's last once it is finished.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        let last = || self.info.phases.last().map(|plan| plan.phase);
+        self.panel
+            .stage
+            .moment()
+            .map(|moment| moment.phase)
+            .or_else(last)
+            .unwrap_or(Phase::Introduction)
+    }
+
+    /// The stage in a few words.
+    #[must_use]
+    pub fn stage_words(&self) -> String {
+        let at = self.panel.stage.moment().map_or(String::new(), |moment| {
+            format!("{}, rollout {}", phase_word(moment.phase), moment.rollout)
+        });
+        let doing = match self.panel.stage {
+            Stage::Instruction(_) => "instruction: ",
+            Stage::Break { .. } => "break before ",
+            Stage::Hold { .. } => "WAIT: ",
+            Stage::Running(_) => "GO: ",
+            Stage::Paused(_) => "PAUSED: ",
+            Stage::Stopped(_) => "STOPPED: ",
+            Stage::Finished(Finish::Complete) => "the session is complete",
+            Stage::Finished(Finish::Aborted) => "the session was ended",
+        };
+        format!("{doing}{at}")
+    }
+
+    /// Writes the message, if there is one, into row `y`, or does `otherwise`.
+    pub(super) fn message_or(
+        &self,
+        pen: &mut Pen<'_>,
+        y: u16,
+        otherwise: impl FnOnce(&mut Pen<'_>),
+    ) {
+        match &self.ui.message {
+            Some(message) => {
+                pen.text(1, y, message, Role::Alarm);
+            }
+            None => otherwise(pen),
+        }
+    }
+}
+
+/// A phase's name as people say it.
+#[must_use]
+pub const fn phase_word(phase: Phase) -> &'static str {
+    match phase {
+        Phase::ZeroControl => "zero control",
+        other => other.word(),
+    }
+}
+
+/// Rows below the scene: rule, five rows of numbers, line of keys.
+const PANEL_ROWS: u16 = 7;
+
+/// Draws the screen.
+pub fn draw(frame: &mut Frame<'_>, view: &View<'_>) {
+    let area = frame.area();
+    let mut pen = Pen::new(frame.buffer_mut(), area, view.ui.look);
+    if small::is_too_small(&pen) {
+        small::draw(&mut pen, Some(view));
+    } else {
+        page(&mut pen, view);
+    }
+    view.ui.look.finish(frame.buffer_mut());
+}
+
+fn page(pen: &mut Pen<'_>, view: &View<'_>) {
+    let is_briefing = matches!(view.panel.stage, Stage::Instruction(_) | Stage::Break { .. });
+    if is_briefing {
+        briefing::draw(pen, view);
+    } else if view.ui.subject_view {
+        subject(pen, view);
+    } else {
+        everything(pen, view);
+    }
+    if view.ui.help_open {
+        let screen = if is_briefing { Screen::Briefing } else { Screen::Live };
+        help::draw(pen, screen, &notes(view.info));
+    }
+}
+
+fn everything(pen: &mut Pen<'_>, view: &View<'_>) {
+    let (width, height) = (pen.width(), pen.height());
+    strip::header(&mut pen.part(0, 0, width, 1), view);
+    strip::phases(&mut pen.part(0, 1, width, 1), view);
+    let rows = height - 2 - PANEL_ROWS;
+    scene(&mut pen.part(0, 2, width, rows), view);
+    pen.rule(2 + rows);
+    panels::draw(&mut pen.part(0, 3 + rows, width, PANEL_ROWS - 2), view);
+    let last = height - 1;
+    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Live));
+    overlay::draw(&mut pen.part(0, 2, width, rows), view);
+}
+
+/// Scene, countdown, number of the rollout and the instruction; nothing else.
+fn subject(pen: &mut Pen<'_>, view: &View<'_>) {
+    let (width, height) = (pen.width(), pen.height());
+    if let Some(moment) = view.panel.stage.moment() {
+        pen.text_until(width - 1, 0, &format!("rollout {:>3}", moment.rollout), Role::Text);
+    }
+    let measure = usize::from(width.min(76));
+    let lines = super::text::wrapped(view.info.instruction(view.phase()), measure);
+    let shown: u16 = 3;
+    scene(&mut pen.part(0, 1, width, height - 2 - shown), view);
+    for (line, row) in lines.iter().zip(0..shown) {
+        pen.centred(height - shown + row, line, Role::Text);
+    }
+    view.message_or(pen, height - 1, |_| {});
+    overlay::draw(&mut pen.part(0, 1, width, height - 2 - shown), view);
+}
+
+/// The plant, and in the row below it the countdown.
+fn scene(pen: &mut Pen<'_>, view: &View<'_>) {
+    let (width, height) = (pen.width(), pen.height());
+    let is_running = matches!(view.scene.stage, Stage::Running(_));
+    let light = if is_running { Light::Go } else { Light::Wait };
+    let SceneInfo::CartPole(geometry) = &view.info.scene;
+    let mut picture = pen.part(0, 0, width, height - 1);
+    cart_pole::draw(&mut picture, geometry, &view.scene.state, light);
+    if let Stage::Hold { moment, ticks_left } = view.scene.stage {
+        let info = view.info;
+        let whole = if moment.phase.is_steered() { info.hold_s } else { info.autonomous_hold_s };
+        let left = f64::from(ticks_left) * info.tick_s;
+        let bar = width.min(64);
+        let mut row = pen.part((width - bar) / 2, height - 1, bar, 1);
+        strip::countdown(&mut row, "WAIT", left, whole, 1);
+    }
+}
+
+/// What the help says beside the keys.
+fn notes(info: &Info) -> Vec<String> {
+    let gate = super::text::fixed(info.gate * 100.0, 0, 0);
+    let mut notes = Vec::new();
+    if !info.robot_watches && info.gate > 0.0 {
+        notes.push(format!(
+            "The robot begins to take over when success reaches {gate} %. With the thesis's \
+             window of 4000 steps that is a timer of about 2,300–2,600 steps rather than a \
+             test of skill."
+        ));
+    }
+    if !info.operator.is_empty() {
+        notes.push(format!("Steered by {}.", info.operator));
+    }
+    notes
+}

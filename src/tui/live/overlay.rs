@@ -1,0 +1,38 @@
+//! Boxes over the scene while the session stands still: what is the matter, what to press.
+
+use super::View;
+use crate::session::machine::{Finish, Stage};
+use crate::tui::palette::Role;
+use crate::tui::pen::{Pen, columns};
+
+/// Draws the box that belongs to the stage, if one does.
+pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
+    let (title, role, lines): (_, _, &[&str]) = match view.panel.stage {
+        Stage::Paused(moment) if moment.phase.is_steered() => {
+            ("PAUSED", Role::Strong, &["P or Enter   go on", "x            discard rollout"])
+        }
+        Stage::Paused(_) => ("PAUSED", Role::Strong, &["P or Enter   go on"]),
+        Stage::Stopped(_) => (
+            "EMERGENCY STOP",
+            Role::Alarm,
+            &["The motor is off.", "Enter   repeat the rollout", "q       end the session"],
+        ),
+        Stage::Finished(Finish::Complete) => {
+            ("COMPLETE", Role::Strong, &["All phases are over.", "Saving; results follow."])
+        }
+        Stage::Finished(Finish::Aborted) => {
+            ("ENDED", Role::Strong, &["The session was ended early.", "Saving; results follow."])
+        }
+        _ => return,
+    };
+    let widest = lines.iter().map(|line| columns(line)).max().unwrap_or(0);
+    let (width, height) =
+        (widest.max(columns(title) + 2) + 4, u16::try_from(lines.len()).unwrap_or(0) + 2);
+    // Left of the middle: where the cart is most of the time stays visible.
+    let x = pen.width().saturating_sub(width) / 2;
+    let mut page = pen.part(x, 1, width, height);
+    let mut page = page.boxed(title, role);
+    for (line, y) in lines.iter().zip(0..) {
+        page.text(0, y, line, Role::Text);
+    }
+}

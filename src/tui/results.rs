@@ -1,0 +1,197 @@
+//! The results of a session: charts with axes and units, and the files written.
+//!
+//! At 80×24 one page at a time; where there is room all of them at once.
+
+mod charts;
+
+use ratatui::Frame;
+
+use super::keys::Screen;
+use super::palette::{Look, Role};
+use super::pen::{Pen, columns};
+use super::text::{cut, fixed, mean, real};
+use super::{help, live, small};
+use crate::record::EpisodeRow;
+use crate::session::Phase;
+
+/// What a session came to.
+#[derive(Clone, Debug, Default)]
+pub struct Info {
+    /// Its title, such as "balance · simultaneous · rfwr · S07 trial 002".
+    pub title: String,
+    /// How it finished, a word.
+    pub finish: String,
+    /// Its rollouts.
+    pub rollouts: Vec<EpisodeRow>,
+    /// The folder of its files.
+    pub folder: String,
+    /// Its files, by name.
+    pub files: Vec<String>,
+    /// What else is to be said of it, a line each.
+    pub summary: Vec<String>,
+    /// The robot alone after each tenth of main: percent of main, mean time, s.
+    pub evaluation: Option<Vec<(u8, f64)>>,
+}
+
+impl Info {
+    /// The rollouts of `phase` that count.
+    fn of(&self, phase: Phase) -> impl Iterator<Item = &EpisodeRow> {
+        self.rollouts.iter().filter(move |row| row.phase == phase && live::counts(row))
+    }
+}
+
+/// The state of the screen.
+#[derive(Clone, Debug, Default)]
+pub struct State {
+    /// The page.
+    page: usize,
+    /// Whether the keys are shown.
+    pub help_open: bool,
+    /// A word to the person, in place of the line of keys.
+    pub message: Option<String>,
+    /// Glyphs and colours.
+    pub look: Look,
+}
+
+/// The pages' titles.
+const PAGES: [&str; 4] = ["balance", "sharing", "robot alone", "files"];
+
+impl State {
+    /// A screen that looks like `look`.
+    #[must_use]
+    pub fn new(look: Look) -> Self {
+        Self { look, ..Self::default() }
+    }
+
+    /// Turns to the next page.
+    pub const fn next(&mut self) {
+        self.page = (self.page + 1) % PAGES.len();
+    }
+
+    /// Turns to the page before.
+    pub const fn previous(&mut self) {
+        self.page = (self.page + PAGES.len() - 1) % PAGES.len();
+    }
+}
+
+/// Draws the screen.
+pub fn draw(frame: &mut Frame<'_>, info: &Info, state: &State) {
+    let area = frame.area();
+    let mut pen = Pen::new(frame.buffer_mut(), area, state.look);
+    if small::is_too_small(&pen) {
+        small::draw(&mut pen, None);
+    } else {
+        whole(&mut pen, info, state);
+    }
+    state.look.finish(frame.buffer_mut());
+}
+
+fn whole(pen: &mut Pen<'_>, info: &Info, state: &State) {
+    let (width, height) = (pen.width(), pen.height());
+    let x = pen.text(1, 0, "coadapt", Role::Dim);
+    let finish = columns(&info.finish);
+    let room = width.saturating_sub(x + finish + 6);
+    pen.text(x + 3, 0, &cut(&info.title, room.into()), Role::Strong);
+    pen.text_until(width - 1, 0, &info.finish, Role::Strong);
+    let last = height - 1;
+    if width >= 120 && height >= 40 {
+        let (half, upper) = (width / 2, (height - 3) / 2);
+        for (page, (column, row)) in (0..).zip([(0, 0), (half, 0), (0, upper), (half, upper)]) {
+            let mut part = pen.part(column, 2 + row, half - 1, upper);
+            part.text(1, 0, PAGES[page], Role::Strong);
+            let (w, h) = (part.width(), part.height());
+            draw_page(&mut part.part(0, 1, w, h - 2), info, page);
+        }
+    } else {
+        let mut x = 1;
+        for (page, title) in PAGES.iter().enumerate() {
+            let is_here = page == state.page;
+            let shown = if is_here { format!("[{title}]") } else { format!(" {title} ") };
+            x = pen.text(x, 1, &shown, if is_here { Role::Strong } else { Role::Dim }) + 2;
+        }
+        draw_page(&mut pen.part(0, 3, width, height - 5), info, state.page);
+    }
+    match &state.message {
+        Some(message) => {
+            pen.text(1, last, message, Role::Alarm);
+        }
+        None => help::hints(pen, last, Screen::Results),
+    }
+    if state.help_open {
+        help::draw(pen, Screen::Results, &[]);
+    }
+}
+
+fn draw_page(pen: &mut Pen<'_>, info: &Info, page: usize) {
+    let (width, height) = (pen.width(), pen.height());
+    match page {
+        0 => {
+            let lines = statistics(info, &[Phase::Introduction, Phase::Main]);
+            let chart = height.saturating_sub(u16::try_from(lines.len()).unwrap_or(0));
+            charts::balance(&mut pen.part(0, 0, width, chart), info);
+            write(&mut pen.part(0, chart, width, height - chart), &lines);
+        }
+        1 => charts::sharing(pen, info),
+        2 => {
+            let lines = statistics(info, &[Phase::Autonomous, Phase::ZeroControl]);
+            let chart = height.saturating_sub(u16::try_from(lines.len()).unwrap_or(0));
+            charts::alone(&mut pen.part(0, 0, width, chart), info);
+            write(&mut pen.part(0, chart, width, height - chart), &lines);
+        }
+        _ => files(pen, info),
+    }
+}
+
+/// A line for each of `phases` that took place: its balance time.
+fn statistics(info: &Info, phases: &[Phase]) -> Vec<String> {
+    let line = |phase: &Phase| {
+        let times: Vec<f64> = info.of(*phase).map(|row| row.duration_s).collect();
+        let average = mean(&times)?;
+        let squares = times.iter().map(|time| (time - average).powi(2)).sum::<f64>();
+        let deviation = (squares / (real(times.len()) - 1.0)).sqrt();
+        Some(format!(
+            "{:<13} {:>4} rollouts   {} s ± {} s (mean ± sd)",
+            live::phase_word(*phase),
+            times.len(),
+            fixed(average, 6, 2),
+            fixed(deviation, 5, 2),
+        ))
+    };
+    phases.iter().filter_map(line).collect()
+}
+
+fn write(pen: &mut Pen<'_>, lines: &[String]) {
+    for (line, y) in lines.iter().zip(0..) {
+        pen.text(1, y, line, Role::Text);
+    }
+}
+
+/// Summary and files, as many as there is room for.
+fn files(pen: &mut Pen<'_>, info: &Info) {
+    let width = usize::from(pen.width().saturating_sub(2));
+    let mut lines: Vec<(String, Role)> =
+        info.summary.iter().map(|line| (cut(line, width), Role::Text)).collect();
+    if !lines.is_empty() {
+        lines.push((String::new(), Role::Text));
+    }
+    if !info.folder.is_empty() {
+        lines.push(("saved in".to_owned(), Role::Dim));
+        lines.push((cut(&info.folder, width), Role::Strong));
+    }
+    // Names in columns: policies alone are eleven.
+    let longest = info.files.iter().map(|name| name.chars().count()).max().unwrap_or(0) + 2;
+    let across = (width / longest.max(1)).max(1);
+    for row in info.files.chunks(across) {
+        let row: String = row.iter().map(|name| format!("{name:<longest$}")).collect();
+        lines.push((cut(row.trim_end(), width), Role::Text));
+    }
+    let height = usize::from(pen.height());
+    if lines.len() > height {
+        let left_out = lines.len() - height + 1;
+        lines.truncate(height.saturating_sub(1));
+        lines.push((format!("… {left_out} lines more"), Role::Dim));
+    }
+    for ((line, role), y) in lines.iter().zip(0..) {
+        pen.text(1, y, line, *role);
+    }
+}

@@ -1,0 +1,179 @@
+//! The charts of the results.
+
+use ratatui::style::Style;
+use ratatui::symbols::Marker;
+use ratatui::text::Line;
+use ratatui::widgets::{Axis, Chart, Dataset, GraphType, LegendPosition, Widget};
+
+use super::Info;
+use crate::record::EpisodeRow;
+use crate::session::Phase;
+use crate::tui::palette::{Glyphs, Role};
+use crate::tui::pen::Pen;
+use crate::tui::text::{moving_mean, real};
+
+type Points = Vec<(f64, f64)>;
+
+/// One set of points: its name, how it is drawn, its colour.
+struct Curve {
+    name: &'static str,
+    graph: GraphType,
+    role: Role,
+    points: Points,
+}
+
+/// An axis: its title, where it begins and ends, decimals of its labels.
+struct Scale {
+    title: &'static str,
+    from: f64,
+    to: f64,
+    decimals: usize,
+}
+
+/// Balance time of each rollout and its moving average.
+pub fn balance(pen: &mut Pen<'_>, info: &Info) {
+    let practice: Vec<f64> = info.of(Phase::Introduction).map(|row| row.duration_s).collect();
+    let main: Vec<f64> = info.of(Phase::Main).map(|row| row.duration_s).collect();
+    let first = real(practice.len());
+    let count = first + real(main.len());
+    let longest = practice.iter().chain(&main).copied().fold(1.0, f64::max);
+    let average = moving_mean(&main, 10);
+    let curves = [
+        Curve {
+            name: "practice",
+            graph: GraphType::Scatter,
+            role: Role::Dim,
+            points: numbered(&practice, 0.0),
+        },
+        Curve {
+            name: "main",
+            graph: GraphType::Scatter,
+            role: Role::Text,
+            points: numbered(&main, first),
+        },
+        Curve {
+            name: "mean of 10",
+            graph: GraphType::Line,
+            role: Role::You,
+            points: numbered(&average, first),
+        },
+    ];
+    let x = Scale { title: "rollout", from: 1.0, to: count, decimals: 0 };
+    let y = Scale { title: "balance time, s", from: 0.0, to: longest.ceil(), decimals: 0 };
+    chart(pen, &curves, &x, &y);
+}
+
+/// Share and success over main's rollouts.
+pub fn sharing(pen: &mut Pen<'_>, info: &Info) {
+    let points = |value: fn(&EpisodeRow) -> Option<f64>| -> Points {
+        info.of(Phase::Main)
+            .filter_map(|row| Some((f64::from(row.episode), value(row)? * 100.0)))
+            .collect()
+    };
+    let curves = [
+        Curve {
+            name: "your share",
+            graph: GraphType::Line,
+            role: Role::You,
+            points: points(|row| row.share),
+        },
+        Curve {
+            name: "success",
+            graph: GraphType::Scatter,
+            role: Role::Go,
+            points: points(|row| row.success),
+        },
+    ];
+    let last = info.of(Phase::Main).map(|row| row.episode).max().unwrap_or(1);
+    let x = Scale { title: "rollout of main", from: 1.0, to: f64::from(last), decimals: 0 };
+    let y = Scale { title: "%", from: 0.0, to: 100.0, decimals: 0 };
+    chart(pen, &curves, &x, &y);
+}
+
+/// The robot's and nobody's time against the release angle; beside it, if it was evaluated,
+/// how the robot got better through main.
+pub fn alone(pen: &mut Pen<'_>, info: &Info) {
+    let (width, height) = (pen.width(), pen.height());
+    match &info.evaluation {
+        Some(tenths) if !tenths.is_empty() => {
+            let half = width / 2;
+            angles(&mut pen.part(0, 0, half, height), info);
+            learning(&mut pen.part(half, 0, width - half, height), tenths);
+        }
+        _ => angles(pen, info),
+    }
+}
+
+fn angles(pen: &mut Pen<'_>, info: &Info) {
+    let points = |phase| -> Points {
+        info.of(phase).map(|row| (row.start.to_degrees(), row.duration_s)).collect()
+    };
+    let (robot, nobody) = (points(Phase::Autonomous), points(Phase::ZeroControl));
+    let all = || robot.iter().chain(&nobody);
+    let widest = all().map(|point| point.0.abs()).fold(0.1, f64::max);
+    let longest = all().map(|point| point.1).fold(1.0, f64::max).ceil();
+    let curves = [
+        Curve { name: "nobody", graph: GraphType::Scatter, role: Role::Dim, points: nobody },
+        Curve { name: "robot", graph: GraphType::Scatter, role: Role::Robot, points: robot },
+    ];
+    let x = Scale { title: "release angle, °", from: -widest, to: widest, decimals: 1 };
+    let y = Scale { title: "balance time, s", from: 0.0, to: longest, decimals: 0 };
+    chart(pen, &curves, &x, &y);
+}
+
+fn learning(pen: &mut Pen<'_>, tenths: &[(u8, f64)]) {
+    let points: Points = tenths.iter().map(|(part, time)| (f64::from(*part), *time)).collect();
+    let longest = points.iter().map(|point| point.1).fold(1.0, f64::max).ceil();
+    let curves = [Curve { name: "robot, mean", graph: GraphType::Line, role: Role::Robot, points }];
+    let x = Scale { title: "% of main", from: 0.0, to: 100.0, decimals: 0 };
+    let y = Scale { title: "alone, s", from: 0.0, to: longest, decimals: 0 };
+    chart(pen, &curves, &x, &y);
+}
+
+/// `values` as points after the first `before` rollouts.
+fn numbered(values: &[f64], before: f64) -> Points {
+    values.iter().enumerate().map(|(index, value)| (before + real(index) + 1.0, *value)).collect()
+}
+
+fn chart(pen: &mut Pen<'_>, curves: &[Curve], x: &Scale, y: &Scale) {
+    if curves.iter().all(|curve| curve.points.is_empty()) {
+        let middle = pen.height() / 2;
+        pen.centred(middle, "nothing here: this phase did not take place", Role::Dim);
+        return;
+    }
+    let look = pen.look;
+    let marker = match look.glyphs {
+        Glyphs::Braille => Marker::Braille,
+        Glyphs::Half => Marker::HalfBlock,
+        Glyphs::Ascii => Marker::Dot,
+    };
+    let data = curves.iter().filter(|curve| !curve.points.is_empty()).map(|curve| {
+        Dataset::default()
+            .name(curve.name)
+            .marker(if curve.graph == GraphType::Scatter { Marker::Dot } else { marker })
+            .graph_type(curve.graph)
+            .style(look.palette.style(curve.role))
+            .data(&curve.points)
+    });
+    let dim = look.palette.style(Role::Dim);
+    let area = pen.area();
+    Chart::new(data.collect())
+        .style(Style::new())
+        .x_axis(axis(x, dim))
+        .y_axis(axis(y, dim))
+        .legend_position(Some(LegendPosition::TopRight))
+        .hidden_legend_constraints((
+            ratatui::layout::Constraint::Ratio(1, 2),
+            ratatui::layout::Constraint::Ratio(1, 2),
+        ))
+        .render(area, pen.buffer());
+}
+
+/// An axis with its title and three labels.
+fn axis(scale: &Scale, style: Style) -> Axis<'static> {
+    // A single point still needs an axis with a length.
+    let to = if scale.to > scale.from { scale.to } else { scale.from + 1.0 };
+    let labels = [scale.from, f64::midpoint(scale.from, to), to]
+        .map(|value| Line::raw(format!("{value:.*}", scale.decimals).replace('-', "−")));
+    Axis::default().title(scale.title).style(style).bounds([scale.from, to]).labels(labels)
+}

@@ -1,0 +1,156 @@
+//! The cart-pole on its track, to scale (thesis fig. 13).
+
+use super::Light;
+use crate::tui::canvas::{Canvas, DOTS_ACROSS, DOTS_DOWN, Point};
+use crate::tui::palette::Role;
+use crate::tui::pen::Pen;
+use crate::tui::text::place;
+
+/// The plant's measures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Geometry {
+    /// The whole pole's length, m.
+    pub pole_length_m: f64,
+    /// The track's length, m; `None` for an endless one, which scrolls under the cart.
+    pub track_length_m: Option<f64>,
+    /// The pole falls beyond ± this angle, rad.
+    pub fail_angle_rad: f64,
+}
+
+/// The drawn cart's width, m: it has no width in the equations.
+const CART_WIDTH_M: f64 = 0.24;
+/// The distance of marks along the track, m.
+const MARK_M: f64 = 0.25;
+
+/// Where things are, in dots.
+struct Place {
+    /// Dots a metre, the same in x and y.
+    scale: f64,
+    cart: Point,
+    cart_half_width: f64,
+    cart_height: f64,
+    wheel: f64,
+    track_y: f64,
+    /// The track's middle; the cart's own place on an endless track.
+    middle_x: f64,
+}
+
+impl Place {
+    /// The largest scale at which the whole pole, held upright or falling at an end of the
+    /// track, stays in the picture.
+    fn new(canvas: &Canvas, geometry: &Geometry, x_m: f64) -> Self {
+        let length = geometry.pole_length_m.max(1e-3);
+        let reach = length * geometry.fail_angle_rad.sin().abs();
+        let track = geometry.track_length_m.unwrap_or(2.0 * reach + CART_WIDTH_M);
+        // Beside the track stand the squares, four cells and a gap at each end.
+        let beside = 2.0 * 5.0 * DOTS_ACROSS;
+        let scale = ((canvas.height() - 12.0) / (1.16 * length))
+            .min((canvas.width() - beside) / (track + CART_WIDTH_M))
+            .min(canvas.width() / (track + 2.0 * reach))
+            .max(1e-6);
+        let wheel = (0.025 * scale).clamp(1.0, 5.0);
+        let track_y = canvas.height() - DOTS_DOWN;
+        let middle_x = (canvas.width() / 2.0).floor();
+        let offset = if geometry.track_length_m.is_some() { x_m * scale } else { 0.0 };
+        let cart_height = (0.08 * scale).clamp(3.0, 14.0);
+        Self {
+            scale,
+            cart: (middle_x + offset, track_y - 2.0 * wheel - cart_height),
+            cart_half_width: (CART_WIDTH_M / 2.0 * scale).max(4.0),
+            cart_height,
+            wheel,
+            track_y,
+            middle_x,
+        }
+    }
+
+    /// The point `length` metres from the pivot at `angle` from upright, to the right.
+    fn from_pivot(&self, length: f64, angle: f64) -> Point {
+        let (sin, cos) = angle.sin_cos();
+        (self.cart.0 + self.scale * length * sin, self.cart.1 - self.scale * length * cos)
+    }
+}
+
+/// Draws the plant in `state` = `[x, ẋ, θ, θ̇]`.
+pub fn draw(pen: &mut Pen<'_>, geometry: &Geometry, state: &[f64], light: Light) {
+    let &[x, _, theta, ..] = state else { return };
+    if pen.width() < 4 || pen.height() < 4 {
+        return;
+    }
+    if !(x.is_finite() && theta.is_finite()) {
+        pen.centred(0, "the state is not a number", Role::Alarm);
+        return;
+    }
+    let mut canvas = Canvas::new(pen.width(), pen.height(), pen.look.glyphs);
+    let place = Place::new(&canvas, geometry, x);
+    track(&mut canvas, geometry, &place, x);
+    limits(&mut canvas, geometry, &place);
+    cart(&mut canvas, &place);
+    pole(&mut canvas, geometry, &place, theta);
+    squares(&mut canvas, geometry, &place, light);
+    canvas.draw(pen);
+}
+
+/// The track's line with a mark every quarter of a metre, a longer one at the middle.
+fn track(canvas: &mut Canvas, geometry: &Geometry, place: &Place, x_m: f64) {
+    let half_m = geometry.track_length_m.map(|length| length / 2.0);
+    let half = half_m.map_or(canvas.width(), |half| half * place.scale + place.cart_half_width);
+    let (left, right) = (place.middle_x - half, place.middle_x + half);
+    canvas.rectangle((left, place.track_y), (right, place.track_y + 1.0), Role::Dim);
+    // On a track with ends the marks stand still; an endless one carries them along.
+    let origin = if half_m.is_some() { 0.0 } else { x_m };
+    let step = MARK_M * (4.0 / (MARK_M * place.scale)).ceil().max(1.0);
+    let reach = half_m.unwrap_or(canvas.width() / 2.0 / place.scale);
+    let first = ((origin - reach) / step).ceil();
+    for k in 0..crate::tui::text::place((2.0 * reach / step).floor() + 1.0).min(400) {
+        let number = first + f64::from(k);
+        let x = place.middle_x + ((number * step - origin) * place.scale).round();
+        let is_long = number % 4.0 == 0.0;
+        let length = if is_long { 3.0 } else { 2.0 };
+        canvas.rectangle((x, place.track_y), (x + 1.0, place.track_y + length), Role::Dim);
+    }
+}
+
+/// A short mark at each angle beyond which the pole has fallen.
+fn limits(canvas: &mut Canvas, geometry: &Geometry, place: &Place) {
+    for angle in [-geometry.fail_angle_rad, geometry.fail_angle_rad] {
+        let length = geometry.pole_length_m;
+        let (from, to) = (place.from_pivot(0.90 * length, angle), place.from_pivot(length, angle));
+        canvas.capsule(from, to, 0.5, Role::Dim);
+    }
+}
+
+fn cart(canvas: &mut Canvas, place: &Place) {
+    let (x, y) = place.cart;
+    let half = place.cart_half_width;
+    canvas.rectangle((x - half, y), (x + half, y + place.cart_height), Role::Text);
+    for side in [-0.6, 0.6] {
+        let middle = (x + side * half, place.track_y - place.wheel);
+        canvas.disc(middle, place.wheel + 0.2, Role::Text);
+    }
+}
+
+fn pole(canvas: &mut Canvas, geometry: &Geometry, place: &Place, theta: f64) {
+    let radius = (0.03 * place.scale).clamp(1.25, 4.0);
+    let bob = 1.8 * radius;
+    let tip = place.from_pivot(geometry.pole_length_m, theta);
+    canvas.pole(place.cart, tip, radius, Role::Text);
+    canvas.disc(tip, bob, Role::Text);
+}
+
+/// The squares at the ends of the track, with their word below.
+fn squares(canvas: &mut Canvas, geometry: &Geometry, at: &Place, light: Light) {
+    let half = geometry
+        .track_length_m
+        .map_or(f64::INFINITY, |length| length / 2.0 * at.scale + at.cart_half_width);
+    let last = (canvas.width() / DOTS_ACROSS - 4.0).max(0.0);
+    let left = ((at.middle_x - half) / DOTS_ACROSS - 5.0).floor().clamp(0.0, last);
+    let right = ((at.middle_x + half) / DOTS_ACROSS + 1.0).ceil().clamp(0.0, last);
+    let word_row = f64::from(place(at.track_y / DOTS_DOWN));
+    for column in [left, right] {
+        for row in [word_row - 2.0, word_row - 1.0] {
+            canvas.text(column, row, light.square(), light.role());
+        }
+        canvas.text(column, word_row, light.word(), light.role());
+    }
+}

@@ -1,0 +1,438 @@
+//! The screens as they look, at 80×24 and 120×40, and that no terminal size or state of the
+//! plant breaks them.
+
+use coadapt::control::snapshot::Snapshot;
+use coadapt::record::EpisodeRow;
+use coadapt::session::machine::{Finish, Stage};
+use coadapt::session::plan::{Instructions, Params, Plan};
+use coadapt::session::{Moment, Phase};
+use coadapt::sharing::weight::Opened;
+use coadapt::signal::{End, Intent, Seconds, State, Tick};
+use coadapt::tui::live::{self, History, Info, SceneInfo, Ui, View};
+use coadapt::tui::palette::{Glyphs, Look, Palette};
+use coadapt::tui::results;
+use coadapt::tui::scene::cart_pole::Geometry;
+use proptest::prelude::*;
+use ratatui::Terminal;
+use ratatui::backend::{CrosstermBackend, TestBackend};
+
+fn info() -> Info {
+    let params = Params::default();
+    let Instructions { introduction, simultaneous, autonomous, .. } = params.instructions.clone();
+    Info {
+        task: "balance".to_owned(),
+        preset: "thesis".to_owned(),
+        mode: "simultaneous".to_owned(),
+        robot_watches: false,
+        learner: "rfwr".to_owned(),
+        subject: "S07".to_owned(),
+        trial: 2,
+        phases: Plan::new(&params, Seconds(0.02), 1, true).phases,
+        instructions: vec![
+            (Phase::Introduction, introduction),
+            (Phase::Main, simultaneous),
+            (Phase::Autonomous, autonomous),
+        ],
+        tick_s: 0.02,
+        hold_s: params.hold_s,
+        autonomous_hold_s: params.autonomous_hold_s,
+        break_s: params.break_s,
+        gate: 0.4,
+        action_limit: 10.0,
+        action_unit: "N".to_owned(),
+        scene: SceneInfo::CartPole(Geometry {
+            pole_length_m: 1.0,
+            track_length_m: Some(1.0),
+            fail_angle_rad: 30_f64.to_radians(),
+        }),
+        field_cap: 100,
+        operator: "keyboard, releases reported".to_owned(),
+    }
+}
+
+fn moment(phase: Phase) -> Moment {
+    Moment { step: 241, steps_before: 6_920, rollout: 38, ..Moment::start_of(phase) }
+}
+
+/// A swing in the middle of main.
+fn running(phase: Phase) -> Snapshot {
+    let mut snapshot = Snapshot::before(Stage::Running(moment(phase)));
+    snapshot.tick = Tick(9_000);
+    snapshot.state = State::new([0.08, -0.2, 9_f64.to_radians(), 24_f64.to_radians()]);
+    snapshot.human = Intent::fresh(-3.5);
+    snapshot.machine = Some(-6.2);
+    snapshot.action = -4.5;
+    snapshot.applied = -4.5;
+    snapshot.shares[0] = 0.63;
+    snapshot.successes[0] = 0.71;
+    snapshot.gate = Some(Opened { step: 2_413, tau_steps: 2_633.4 });
+    snapshot.fields = 64;
+    snapshot.learned = 7_214;
+    snapshot.lateness = Seconds(0.0001);
+    snapshot
+}
+
+fn hold() -> Snapshot {
+    let at = Moment { step: 0, ..moment(Phase::Main) };
+    let mut snapshot = running(Phase::Main);
+    snapshot.stage = Stage::Hold { moment: at, ticks_left: 90 };
+    snapshot.state = State::new([0.0, 0.0, 3_f64.to_radians(), 0.0]);
+    snapshot.human = Intent::fresh(0.0);
+    snapshot.machine = None;
+    snapshot
+}
+
+fn row(phase: Phase, episode: u32) -> EpisodeRow {
+    let n = f64::from(episode);
+    let wobble = 1.0 + 0.4 * (n * 2.4).sin();
+    let (duration, share, success) = match phase {
+        Phase::Introduction => (1.5 * wobble, None, None),
+        Phase::Main => {
+            let share = if episode < 20 { 1.0 } else { (-(n - 20.0) / 40.0).exp() };
+            ((1.0 + n / 9.0) * wobble, Some(share), Some((n / 60.0).min(0.86)))
+        }
+        Phase::Autonomous => (12.0 * wobble, Some(0.0), None),
+        Phase::ZeroControl => (0.9 * wobble, None, None),
+    };
+    EpisodeRow {
+        phase,
+        episode,
+        start: (10.0 * (n - 1.0) / 99.0 - 5.0).to_radians(),
+        steps: 100,
+        duration_s: duration.min(20.0),
+        end: End::Failed,
+        total: 70.0,
+        mean_reward: 0.7,
+        share,
+        success,
+        receptive_fields: Some(50),
+    }
+}
+
+fn history(rollouts_of_main: u32) -> History {
+    let introduction = (1..=20).map(|k| row(Phase::Introduction, k));
+    let main = (1..=rollouts_of_main).map(|k| row(Phase::Main, k));
+    History {
+        rollouts: introduction.chain(main).collect(),
+        success: (0..60_u8).map(|k| f64::from(k) / 60.0 * 0.71).collect(),
+    }
+}
+
+/// The screen as text.
+fn picture(width: u16, height: u16, info: &Info, snapshot: &Snapshot, ui: &Ui) -> TestBackend {
+    let history = history(37);
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+    let view = View { info, scene: snapshot, panel: snapshot, history: &history, ui };
+    terminal.draw(|frame| live::draw(frame, &view)).unwrap();
+    terminal.backend().clone()
+}
+
+fn both(name: &str, info: &Info, snapshot: &Snapshot, ui: &Ui) {
+    insta::assert_snapshot!(format!("{name}_80x24"), picture(80, 24, info, snapshot, ui));
+    insta::assert_snapshot!(format!("{name}_120x40"), picture(120, 40, info, snapshot, ui));
+}
+
+fn small(name: &str, info: &Info, snapshot: &Snapshot, ui: &Ui) {
+    insta::assert_snapshot!(name, picture(80, 24, info, snapshot, ui));
+}
+
+#[test]
+fn a_swing_in_main() {
+    both("main", &info(), &running(Phase::Main), &Ui::default());
+}
+
+#[test]
+fn before_the_gate() {
+    let mut snapshot = running(Phase::Main);
+    snapshot.gate = None;
+    snapshot.shares[0] = 1.0;
+    snapshot.successes[0] = 0.23;
+    small("before_the_gate", &info(), &snapshot, &Ui::default());
+}
+
+#[test]
+fn the_countdown() {
+    both("countdown", &info(), &hold(), &Ui::default());
+}
+
+#[test]
+fn the_robot_watches() {
+    let info = Info { mode: "sequential".to_owned(), robot_watches: true, ..info() };
+    let mut snapshot = running(Phase::Main);
+    snapshot.shares[0] = 1.0;
+    small("sequential", &info, &snapshot, &Ui::default());
+}
+
+#[test]
+fn practice_has_nobody_but_you() {
+    let mut snapshot = running(Phase::Introduction);
+    snapshot.machine = None;
+    small("introduction", &info(), &snapshot, &Ui::default());
+}
+
+#[test]
+fn the_robot_alone_and_nobody() {
+    let mut snapshot = running(Phase::Autonomous);
+    snapshot.human = Intent::Absent;
+    snapshot.speed = 16.0;
+    small("autonomous", &info(), &snapshot, &Ui::default());
+    snapshot.stage = Stage::Running(moment(Phase::ZeroControl));
+    snapshot.machine = None;
+    small("zero_control", &info(), &snapshot, &Ui::default());
+}
+
+#[test]
+fn paused_stopped_finished() {
+    let mut snapshot = running(Phase::Main);
+    snapshot.stage = Stage::Paused(moment(Phase::Main));
+    small("paused", &info(), &snapshot, &Ui::default());
+    snapshot.stage = Stage::Stopped(moment(Phase::Main));
+    small("stopped", &info(), &snapshot, &Ui::default());
+    snapshot.stage = Stage::Finished(Finish::Complete);
+    small("finished", &info(), &snapshot, &Ui::default());
+}
+
+#[test]
+fn what_the_subject_sees() {
+    let ui = Ui { subject_view: true, ..Ui::default() };
+    both("subject", &info(), &running(Phase::Main), &ui);
+    small("subject_countdown", &info(), &hold(), &ui);
+}
+
+#[test]
+fn hidden_progress_tells_neither_share_nor_success() {
+    let ui = Ui { show_progress: false, ..Ui::default() };
+    small("progress_hidden", &info(), &running(Phase::Main), &ui);
+}
+
+#[test]
+fn plainer_glyphs() {
+    for (name, glyphs) in [("half", Glyphs::Half), ("ascii", Glyphs::Ascii)] {
+        let ui = Ui { look: Look { glyphs, ..Look::default() }, ..Ui::default() };
+        small(name, &info(), &running(Phase::Main), &ui);
+        let text = picture(80, 24, &info(), &hold(), &ui).to_string();
+        assert!(glyphs != Glyphs::Ascii || text.is_ascii());
+    }
+}
+
+#[test]
+fn without_colours_there_are_only_bold_and_reverse() {
+    let plain = Look { palette: Palette::Plain, ..Look::default() };
+    let ui = Ui { look: plain, ..Ui::default() };
+    let backend = picture(80, 24, &info(), &hold(), &ui);
+    let mut styles: Vec<String> = backend
+        .buffer()
+        .content
+        .iter()
+        .map(|cell| format!("{:?} {:?} {:?}", cell.fg, cell.bg, cell.modifier))
+        .collect();
+    styles.sort();
+    styles.dedup();
+    insta::assert_snapshot!("no_colour_styles", styles.join("\n"));
+}
+
+#[test]
+fn an_endless_track_scrolls() {
+    let mut info = info();
+    info.scene = SceneInfo::CartPole(Geometry {
+        pole_length_m: 1.0,
+        track_length_m: None,
+        fail_angle_rad: 30_f64.to_radians(),
+    });
+    let mut snapshot = running(Phase::Main);
+    snapshot.state = State::new([3.1, 0.0, -0.4, 0.0]);
+    small("endless", &info, &snapshot, &Ui::default());
+}
+
+#[test]
+fn between_the_phases() {
+    let mut snapshot = Snapshot::before(Stage::Instruction(Moment::start_of(Phase::Main)));
+    both("briefing", &info(), &snapshot, &Ui::default());
+    let next = Moment::start_of(Phase::Autonomous);
+    snapshot.stage = Stage::Break { next, ticks_left: 2_150 };
+    small("break", &info(), &snapshot, &Ui::default());
+}
+
+#[test]
+fn the_keys_and_a_message() {
+    let ui = Ui { help_open: true, ..Ui::default() };
+    small("help", &info(), &running(Phase::Main), &ui);
+    let message = "q again to end the session, any other key goes on".to_owned();
+    let ui = Ui { message: Some(message), ..Ui::default() };
+    small("message", &info(), &running(Phase::Main), &ui);
+}
+
+#[test]
+fn a_small_terminal_says_so() {
+    let snapshot = running(Phase::Main);
+    for (width, height) in [(79, 24), (40, 10), (10, 3), (1, 1)] {
+        let name = format!("small_{width}x{height}");
+        let screen = picture(width, height, &info(), &snapshot, &Ui::default());
+        insta::assert_snapshot!(name, screen);
+    }
+}
+
+fn results() -> results::Info {
+    let alone = [Phase::Autonomous, Phase::ZeroControl]
+        .into_iter()
+        .flat_map(|phase| (1..=100).map(move |k| row(phase, k)));
+    results::Info {
+        title: "balance · simultaneous · rfwr · S07 trial 002".to_owned(),
+        finish: "complete".to_owned(),
+        rollouts: history(100).rollouts.into_iter().chain(alone).collect(),
+        folder: "logs/S07/002-balance-simultaneous".to_owned(),
+        files: ["session.json", "steps.csv", "episodes.csv", "events.csv", "evaluation.csv"]
+            .into_iter()
+            .map(str::to_owned)
+            .chain((1..=10).map(|k| format!("policy-{:03}.json", k * 10)))
+            .collect(),
+        summary: vec!["gate opened at step 2413, τ 2633 steps, final share 14 %".to_owned()],
+        evaluation: Some((1..=10).map(|k| (k * 10, 1.4 * f64::from(k))).collect()),
+    }
+}
+
+fn results_picture(width: u16, height: u16, info: &results::Info, s: &results::State) -> String {
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+    terminal.draw(|frame| results::draw(frame, info, s)).unwrap();
+    terminal.backend().to_string()
+}
+
+#[test]
+fn pages_of_results() {
+    let mut state = results::State::default();
+    let info = results();
+    for page in 0..4 {
+        let screen = results_picture(80, 24, &info, &state);
+        insta::assert_snapshot!(format!("results_{page}"), screen);
+        state.next();
+    }
+    insta::assert_snapshot!("results_120x40", results_picture(120, 40, &info, &state));
+    let empty = results_picture(80, 24, &results::Info::default(), &state);
+    insta::assert_snapshot!("results_empty", empty);
+    state.look.glyphs = Glyphs::Ascii;
+    assert!(results_picture(120, 40, &info, &state).is_ascii());
+}
+
+/// Bytes that a terminal receives a frame in ten seconds of a balancing swing at 30 frames
+/// a second, numbers ten times a second, after the first frame.
+fn bytes_per_frame(width: u16, height: u16) -> usize {
+    let (info, history) = (info(), history(37));
+    let mut panel = running(Phase::Main);
+    let mut bytes: Vec<u8> = Vec::new();
+    let mut before = TestBackend::new(width, height).buffer().clone();
+    let mut first = 0;
+    let ui = Ui { ..Ui::default() };
+    for k in 0..=300_u32 {
+        let t = f64::from(k) / 30.0;
+        let mut scene = running(Phase::Main);
+        let angle = 6.0 * (2.6 * t).sin() + 2.0 * (6.1 * t).sin();
+        scene.state = State::new([
+            0.12 * (0.9 * t).sin() + 0.05 * (2.6 * t).sin(),
+            0.0,
+            angle.to_radians(),
+            (15.6 * (2.6 * t).cos()).to_radians(),
+        ]);
+        scene.human = Intent::fresh(if (1.7 * t).sin() > 0.0 { 10.0 } else { -10.0 });
+        scene.machine = Some(4.0 * (2.6 * t).sin());
+        scene.applied = 0.63 * scene.human.action().0 + 0.37 * scene.machine.unwrap_or(0.0);
+        scene.learned += u64::from(k) * 50 / 30;
+        scene.stage = Stage::Running(Moment { step: k * 50 / 30, ..moment(Phase::Main) });
+        scene.lateness = Seconds(0.0001 * f64::from(k % 4));
+        if k % 3 == 0 {
+            panel = scene;
+        }
+        let view = View { info: &info, scene: &scene, panel: &panel, history: &history, ui: &ui };
+        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+        terminal.draw(|frame| live::draw(frame, &view)).unwrap();
+        let now = terminal.backend().buffer().clone();
+        let mut out = CrosstermBackend::new(&mut bytes);
+        let changes = before.diff(&now);
+        ratatui::backend::Backend::draw(&mut out, changes.into_iter()).unwrap();
+        before = now;
+        if k == 0 {
+            first = bytes.len();
+        }
+    }
+    (bytes.len() - first) / 300
+}
+
+#[test]
+fn a_swing_costs_few_bytes() {
+    // Synchronised updates add 16 bytes to each frame.
+    let (usual, large) = (bytes_per_frame(80, 24) + 16, bytes_per_frame(120, 40) + 16);
+    eprintln!("bytes a frame: {usual} at 80×24, {large} at 120×40");
+    assert!(usual <= 260, "{usual} bytes a frame: over 8 kB/s at 30 frames a second");
+}
+
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![any::<f64>(), -2.0..2.0, Just(f64::NAN), Just(f64::INFINITY), Just(0.0)]
+}
+
+fn any_stage() -> impl Strategy<Value = Stage> {
+    let moment = (0..4_usize, any::<u32>(), any::<u32>(), any::<u64>()).prop_map(
+        |(phase, rollout, step, steps_before)| Moment {
+            phase: Phase::ALL[phase],
+            rollout,
+            attempt: 0,
+            step,
+            steps_before,
+        },
+    );
+    (0..8_u8, moment, any::<u32>()).prop_map(|(kind, moment, ticks_left)| match kind {
+        0 => Stage::Instruction(moment),
+        1 => Stage::Break { next: moment, ticks_left },
+        2 => Stage::Hold { moment, ticks_left },
+        3 => Stage::Paused(moment),
+        4 => Stage::Stopped(moment),
+        5 => Stage::Finished(Finish::Aborted),
+        _ => Stage::Running(moment),
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+    #[test]
+    fn no_size_and_no_state_breaks_a_screen(
+        (width, height) in (1..200_u16, 1..60_u16),
+        stage in any_stage(),
+        numbers in prop::array::uniform12(any_number()),
+        (glyphs, flags, region) in (0..3_u8, any::<u8>(), any::<usize>()),
+    ) {
+        let [x, v, angle, turn, human, machine, applied, share, success, late, speed, tau] = numbers;
+        let mut snapshot = Snapshot::before(stage);
+        snapshot.state = State::new([x, v, angle, turn]);
+        snapshot.human = Intent::fresh(human);
+        snapshot.machine = Some(machine);
+        snapshot.applied = applied;
+        snapshot.shares = [share; 8];
+        snapshot.successes = [success; 8];
+        snapshot.lateness = Seconds(late);
+        snapshot.speed = speed;
+        snapshot.gate = Some(Opened { step: u64::MAX, tau_steps: tau });
+        snapshot.region = region;
+        snapshot.learned = u64::MAX;
+        let glyphs = [Glyphs::Braille, Glyphs::Half, Glyphs::Ascii][usize::from(glyphs)];
+        let ui = Ui {
+            show_progress: flags & 1 == 0,
+            subject_view: flags & 2 == 0,
+            help_open: flags & 4 == 0,
+            message: (flags & 8 == 0).then(|| "字".repeat(60)),
+            look: Look { glyphs, ..Look::default() },
+        };
+        let mut info = info();
+        if flags & 16 == 0 {
+            let SceneInfo::CartPole(geometry) = &mut info.scene;
+            geometry.track_length_m = None;
+            geometry.pole_length_m = x;
+        }
+        picture(width, height, &info, &snapshot, &ui);
+        let mut state = results::State::new(ui.look);
+        state.help_open = ui.help_open;
+        let mut info = results();
+        info.rollouts.truncate(usize::from(flags));
+        if let Some(row) = info.rollouts.first_mut() {
+            (row.duration_s, row.start) = (x, v);
+        }
+        results_picture(width, height, &info, &state);
+    }
+}
