@@ -17,5 +17,6 @@ pub mod palette;
 pub mod pen;
 pub mod results;
 pub mod scene;
+pub mod setup;
 pub mod small;
 pub mod text;
