@@ -36,7 +36,8 @@ static LAST_WORDS: Mutex<Option<String>> = Mutex::new(None);
 pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
     let clock = WallClock::start();
     let feed = Feed::new(Hands::new(&terminal::Params::default()), clock);
-    let mut stage = Stage { feed: feed.clone(), shutdown: Shutdown::listen(), running: None, last: None };
+    let mut stage =
+        Stage { feed: feed.clone(), shutdown: Shutdown::listen(), running: None, last: None };
     // Everything that could be refused is refused before the screen is taken.
     let start = match run {
         None => Start::Setup(Box::default()),

@@ -109,9 +109,7 @@ pub fn run(
                 setup_page::show(screen, conductor, *order)?
             }
             Next::Live(running) => live_page::show(screen, conductor, *running)?,
-            Next::Results(info, look) => {
-                results_page::show(screen, conductor, &info, &look, &last)
-            }
+            Next::Results(info, look) => results_page::show(screen, conductor, &info, &look, &last),
             Next::End(end) => return Ok(end),
         };
     }

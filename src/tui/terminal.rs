@@ -230,9 +230,9 @@ fn read(sender: &SyncSender<Heard>, feed: &Feed, stop: &AtomicBool) {
         }
     }
     while !stop.load(Ordering::SeqCst) {
-        match event::poll(Duration::from_millis(100)).and_then(|ready| {
-            if ready { event::read().map(Some) } else { Ok(None) }
-        }) {
+        match event::poll(Duration::from_millis(100))
+            .and_then(|ready| if ready { event::read().map(Some) } else { Ok(None) })
+        {
             Ok(Some(event)) => {
                 feed.take(&event);
                 // A full queue means that nobody looks; hands were fed all the same.

@@ -8,12 +8,12 @@ use ratatui::crossterm::event::Event;
 use super::{Conductor, End, Next, Running, hear};
 use crate::clock::Clock;
 use crate::profile::Order;
+use crate::tui::help;
 use crate::tui::keys::Screen as Keys;
 use crate::tui::palette::Look;
 use crate::tui::pen::Pen;
 use crate::tui::setup::{self, Extras, Reaction, Setup, Shelf};
 use crate::tui::terminal::{Screen, look};
-use crate::tui::help;
 
 /// Where profiles are saved.
 const PROFILES: &str = "profiles";

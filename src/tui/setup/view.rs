@@ -72,7 +72,7 @@ impl View<'_> {
         self.how(pen);
         self.picture(pen, height);
         self.below(pen, height);
-        help::hints(pen, height - 1, Screen::Setup);
+        help::hints(pen, height - 1, Screen::Setup, false);
     }
 
     /// How the value of `field` is shown.
