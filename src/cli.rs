@@ -33,7 +33,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// One session: introduction, main, autonomous.
-    Run(Run),
+    Run(Box<Run>),
     /// Let a recorded policy act alone over many starts.
     Evaluate(Evaluate),
     /// A plant open loop: a table of actions in, a table of states out.
@@ -87,7 +87,7 @@ pub struct Run {
     /// The seed of everything left to chance [default: drawn and stored].
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Change a value of the profile, such as plant.pole_length_m=0.6.
+    /// Change a value of the profile, such as `plant.pole_length_m=0.6`.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
     /// The folder of all sessions.
@@ -134,7 +134,7 @@ pub struct Simulate {
     /// The seed of the plant's noise.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Change a value of the profile, such as plant.pole_length_m=0.6.
+    /// Change a value of the profile, such as `plant.pole_length_m=0.6`.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
 }
@@ -155,7 +155,7 @@ pub enum Profile {
 pub struct Looked {
     /// A name in `profiles/` or built in, or a path.
     pub profile: String,
-    /// Change a value of the profile, such as plant.pole_length_m=0.6.
+    /// Change a value of the profile, such as `plant.pole_length_m=0.6`.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
 }

@@ -165,7 +165,9 @@ impl<W: Witness> Cycle<W> {
 
     fn show_earlier(&mut self, earlier: Vec<EpisodeRow>) {
         if let Some(publisher) = &self.crew.publisher {
-            earlier.iter().for_each(|row| publisher.rollout(*row));
+            for row in &earlier {
+                publisher.rollout(*row);
+            }
         }
         self.episodes = earlier;
     }

@@ -81,7 +81,7 @@ impl Results {
 
 /// Evaluates, measures and writes the last files.
 pub(super) fn conclude(
-    profile: Profile,
+    profile: &Profile,
     sidecar: Sidecar,
     folder: PathBuf,
     outcome: Outcome<Scribe>,
@@ -100,7 +100,7 @@ pub(super) fn conclude(
     };
     let mut means = Vec::new();
     if finish == Finish::Complete && fault.is_none() && !tenths.is_empty() {
-        let rows = evaluation(&profile, &tenths, sidecar.seed, &episodes);
+        let rows = evaluation(profile, &tenths, sidecar.seed, &episodes);
         means = tenth_means(&tenths, &rows);
         recorder.evaluation(rows);
     }

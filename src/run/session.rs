@@ -272,7 +272,7 @@ impl Session {
             ..self.sidecar
         };
         let frames = self.frames.load(Ordering::Relaxed);
-        conclude(self.profile, sidecar, self.folder, outcome, frames, signal())
+        conclude(&self.profile, sidecar, self.folder, outcome, frames, signal())
     }
 }
 

@@ -261,9 +261,8 @@ pub fn look(wanted: profile::Glyphs) -> Look {
     let glyphs = match wanted {
         profile::Glyphs::Braille => Glyphs::Braille,
         profile::Glyphs::Half => Glyphs::Half,
-        profile::Glyphs::Ascii => Glyphs::Ascii,
         profile::Glyphs::Auto if speaks_unicode && !is_console => Glyphs::Braille,
-        profile::Glyphs::Auto => Glyphs::Ascii,
+        profile::Glyphs::Ascii | profile::Glyphs::Auto => Glyphs::Ascii,
     };
     Look { glyphs, palette }
 }
