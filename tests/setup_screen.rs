@@ -154,6 +154,36 @@ fn a_plain_palette_and_7_bit_glyphs_show_the_same() {
 }
 
 #[test]
+fn the_focus_is_seen_without_colour() {
+    let mut desk = Desk::nowhere();
+    let look = Look { palette: Palette::Plain, ..Look::default() };
+    for field in Field::ALL.into_iter().filter(|f| !matches!(f, Field::Task | Field::Unfinished)) {
+        match field {
+            Field::Skill | Field::Script => {
+                desk.go(Field::Operator).right(1);
+            }
+            Field::Policy => {
+                desk.go(Field::Introduction).type_text(" ").go(Field::Main).type_text(" ");
+            }
+            _ => {}
+        }
+        desk.go(field);
+        if field == Field::Script {
+            // A file is missing so far, and that would be marked too.
+            desk.type_text("hands.csv");
+        }
+        let picture = desk.picture_on(80, 24, look);
+        let buffer = picture.buffer();
+        let marked: Vec<u16> = (0..24).filter(|y| buffer[(1, *y)].symbol() == "›").collect();
+        let reversed = |y: u16| {
+            (0..80).any(|x| buffer[(x, y)].modifier.contains(ratatui::style::Modifier::REVERSED))
+        };
+        assert_eq!(marked.len(), 1, "{field:?}");
+        assert!((0..18).all(|y| reversed(y) == marked.contains(&y)), "{field:?}");
+    }
+}
+
+#[test]
 fn a_wrong_subject_is_told_at_once_and_does_not_begin() {
     let mut desk = Desk::nowhere();
     desk.go(Field::Subject).type_text("S/7 q");
