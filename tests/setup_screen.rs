@@ -10,7 +10,7 @@ use coadapt::tui::setup::{self, Extras, Field, Reaction, Setup, Shelf};
 use proptest::prelude::*;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
 /// A screen with someone who carries out what it asks for.
 struct Desk {
@@ -280,6 +280,8 @@ fn profiles_are_saved_never_over_another_unasked_and_opened_again() {
     desk.press(KeyCode::Char('s'));
     desk.press(KeyCode::Enter);
     assert!(desk.shows("Replace it?"));
+    let held = KeyEvent { kind: KeyEventKind::Repeat, ..KeyEvent::from(KeyCode::Enter) };
+    assert_eq!(desk.key(held), Reaction::Stay);
     desk.press(KeyCode::Esc);
     assert_eq!(std::fs::read_to_string(folder.path().join("mine.ron")).unwrap(), text);
     desk.press(KeyCode::Char('s'));
