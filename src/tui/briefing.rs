@@ -2,7 +2,7 @@
 
 use super::help;
 use super::keys::Screen;
-use super::live::View;
+use super::live::{View, phase_word, strip};
 use super::palette::Role;
 use super::pen::Pen;
 use super::text::wrapped;
@@ -15,12 +15,17 @@ const MEASURE: u16 = 56;
 /// Draws the instruction or the break that `view` is at.
 pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
     let last = pen.height().saturating_sub(1);
+    if !view.ui.subject_view {
+        let width = pen.width();
+        strip::header(&mut pen.part(0, 0, width, 1), view);
+        strip::phases(&mut pen.part(0, 1, width, 1), view);
+    }
     match view.panel.stage {
         Stage::Instruction(moment) => instruction(pen, view, moment),
         Stage::Break { next, ticks_left } => rest(pen, view, next, ticks_left),
         _ => {}
     }
-    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Briefing));
+    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Briefing, true));
 }
 
 fn instruction(pen: &mut Pen<'_>, view: &View<'_>, moment: Moment) {
@@ -42,17 +47,18 @@ fn instruction(pen: &mut Pen<'_>, view: &View<'_>, moment: Moment) {
 
 fn rest(pen: &mut Pen<'_>, view: &View<'_>, next: Moment, ticks_left: u32) {
     let top = pen.height() / 4;
+    pen.centred(top.saturating_sub(1), "next", Role::Dim);
     heading(pen, view, top, next.phase);
     let seconds = (f64::from(ticks_left) * view.info.tick_s).ceil();
     pen.centred(top + 3, "Take a break.", Role::Text);
     let whole = view.info.break_s.max(seconds).max(1.0);
     let mut line = pen.part((pen.width().saturating_sub(44)) / 2, top + 5, 44, 1);
-    super::live::strip::countdown(&mut line, "rest", seconds, whole, 0);
+    strip::countdown(&mut line, ("rest", Role::Text), seconds, whole, 0);
     button(pen, top + 8, "Enter   go on now");
 }
 
 fn heading(pen: &mut Pen<'_>, view: &View<'_>, y: u16, phase: Phase) {
-    pen.centred(y, &super::live::phase_word(phase).to_uppercase(), Role::Strong);
+    pen.centred(y, &phase_word(phase).to_uppercase(), Role::Strong);
     let about = match view.info.rollouts(phase) {
         Some(1) => "1 rollout".to_owned(),
         Some(rollouts) => format!("{rollouts} rollouts"),

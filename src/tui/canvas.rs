@@ -83,8 +83,14 @@ impl Canvas {
         self.fill(from, to, role, |p| p.0 >= from.0 && p.0 < to.0 && p.1 >= from.1 && p.1 < to.1);
     }
 
-    /// A filled disc.
+    /// A filled disc; where there are no dots a small one is a pair of letters.
     pub fn disc(&mut self, middle: Point, radius: f64, role: Role) {
+        if self.glyphs == Glyphs::Ascii && radius < 3.0 {
+            let (column, row) = in_cells(middle);
+            self.glyph(column - 0.5, row, 'O', role);
+            self.glyph(column + 0.5, row, 'O', role);
+            return;
+        }
         self.capsule(middle, middle, radius, role);
     }
 
@@ -102,29 +108,36 @@ impl Canvas {
             self.capsule(from, to, radius, role);
             return;
         }
-        let (across, down) = ((to.0 - from.0) / DOTS_ACROSS, (to.1 - from.1) / DOTS_DOWN);
+        let (a, b) = (in_cells(from), in_cells(to));
+        let (across, down) = (b.0 - a.0, b.1 - a.1);
         if !(across.is_finite() && down.is_finite()) {
             return;
         }
         let lean = across / down;
+        if lean.abs() > 2.5 || down == 0.0 {
+            let (low, high) = (a.0.min(b.0).max(0.0), a.0.max(b.0).min(f64::from(self.columns)));
+            for column in place(low.floor())..place(high.ceil()) {
+                let middle = (f64::from(column) + 0.5).clamp(a.0.min(b.0), a.0.max(b.0));
+                let row = if across == 0.0 { a.1 } else { a.1 + (middle - a.0) / lean };
+                self.glyph(middle, row, '-', role);
+            }
+            return;
+        }
         let glyph = match lean {
-            _ if lean.abs() > 2.5 || down == 0.0 => '-',
             _ if lean > 0.35 => '\\',
             _ if lean < -0.35 => '/',
             _ => '|',
         };
-        // Long ones are cut at the canvas, so that the walk stays short.
-        let steps = (across.abs().max(down.abs()) * 2.0).ceil().clamp(1.0, 2000.0);
-        for step in 0..=place(steps) {
-            let part = f64::from(step) / steps;
-            let column = (from.0 + (to.0 - from.0) * part) / DOTS_ACROSS;
-            let row = (from.1 + (to.1 - from.1) * part) / DOTS_DOWN;
+        let (low, high) = (a.1.min(b.1).max(0.0), a.1.max(b.1).min(f64::from(self.rows)));
+        for row in place(low.floor())..place(high.ceil()) {
+            let middle = (f64::from(row) + 0.5).clamp(a.1.min(b.1), a.1.max(b.1));
+            let column = a.0 + (middle - a.1) * lean;
             // Two characters wide where one would be too thin: left and right of the middle.
-            if glyph != '-' && radius > 1.0 {
-                self.glyph(column - 0.5, row, glyph, role);
-                self.glyph(column + 0.5, row, glyph, role);
+            if radius > 1.0 {
+                self.glyph(column - 0.5, middle, glyph, role);
+                self.glyph(column + 0.5, middle, glyph, role);
             } else {
-                self.glyph(column, row, glyph, role);
+                self.glyph(column, middle, glyph, role);
             }
         }
     }
@@ -180,13 +193,18 @@ impl Canvas {
                 QUARTERS[index]
             }
             Glyphs::Ascii => match (lit & UPPER != 0, lit & !UPPER != 0) {
-                _ if lit.count_ones() >= 5 => '#',
+                _ if lit.count_ones() >= 4 && lit & UPPER != lit => '#',
                 (true, true) => '+',
-                (true, false) => '"',
+                (true, false) => '-',
                 (false, _) => '_',
             },
         }
     }
+}
+
+/// A point in dots as columns and rows.
+fn in_cells(point: Point) -> Point {
+    (point.0 / DOTS_ACROSS, point.1 / DOTS_DOWN)
 }
 
 /// The distance of `p` from the segment between `a` and `b`.
@@ -236,7 +254,7 @@ mod tests {
     #[test]
     fn dots_become_the_terminals_glyphs() {
         for (glyphs, whole, upper) in
-            [(Glyphs::Braille, '⣿', '⠛'), (Glyphs::Half, '█', '▀'), (Glyphs::Ascii, '#', '"')]
+            [(Glyphs::Braille, '⣿', '⠛'), (Glyphs::Half, '█', '▀'), (Glyphs::Ascii, '#', '-')]
         {
             let mut canvas = Canvas::new(2, 1, glyphs);
             canvas.rectangle((0.0, 0.0), (2.0, 4.0), Role::Text);

@@ -36,14 +36,29 @@ pub fn draw(pen: &mut Pen<'_>, screen: Screen, notes: &[String]) {
     }
 }
 
-/// The line of keys at the bottom of a screen.
-pub fn hints(pen: &mut Pen<'_>, y: u16, screen: Screen) {
+/// The line of keys at the bottom of `screen`, in row `y`; `steered`: by a person.
+pub fn hints(pen: &mut Pen<'_>, y: u16, screen: Screen, steered: bool) {
     let mut x = 1;
-    for (key, word) in keys::hints(screen) {
+    for (key, word) in keys::hints(screen, steered) {
         if x + columns(key) + 1 + columns(word) > pen.width() {
             break;
         }
         x = pen.text(x, y, key, Role::Strong);
-        x = pen.text(x + 1, y, word, Role::Dim) + 3;
+        x = pen.text(x + 1, y, word, Role::Dim) + 2;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_of_keys_fits_the_smallest_screen() {
+        for (screen, steered) in Screen::ALL.into_iter().flat_map(|s| [(s, true), (s, false)]) {
+            let length: u16 = keys::hints(screen, steered)
+                .map(|(key, word)| columns(key) + columns(word) + 3)
+                .sum();
+            assert!(length > 0 && length - 2 < 80, "{}: {length}", screen.word());
+        }
     }
 }

@@ -135,9 +135,16 @@ pub const BINDINGS: &[Binding] = {
         elsewhere(Live, "← →", "push", "push the cart while held; also h l and a d"),
         bind(Live, &[Char(' ')], "space", "stop", "emergency stop, until Enter", A::Stop),
         bind(Live, &[Enter], "Enter", "", "go on after a stop or a pause", A::Begin),
-        bind(Live, &[Char('P'), Esc], "P Esc", "pause", "pause, or go on", A::Pause),
+        bind(Live, &[Char('P'), Esc], "P", "pause", "pause, or go on; also Esc", A::Pause),
         bind(Live, &[Char('x')], "x", "discard", "throw this rollout away, repeat it", A::Discard),
-        bind(Live, &[Char('f')], "f", "", "faster while nobody steers: 1 4 16× max", A::Faster),
+        bind(
+            Live,
+            &[Char('f')],
+            "f",
+            "faster",
+            "faster while nobody steers: 1 4 16× max",
+            A::Faster,
+        ),
         bind(Live, &[Char('p')], "p", "progress", "show or hide share and success", A::Progress),
         bind(Live, &[Char('v')], "v", "subject", "the subject's view, or all", A::SubjectView),
         bind(Live, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
@@ -181,9 +188,15 @@ pub fn of(screen: Screen) -> impl Iterator<Item = &'static Binding> {
     BINDINGS.iter().filter(move |binding| binding.screen == screen)
 }
 
-/// The line of keys at the bottom of `screen`: pairs of key and word.
-pub fn hints(screen: Screen) -> impl Iterator<Item = (&'static str, &'static str)> {
-    of(screen).filter(|b| !b.hint.is_empty()).map(|b| (b.shown, b.hint))
+/// The line of keys at the bottom of `screen`: pairs of key and word. Where nobody steers
+/// there is nothing to push or discard, where somebody does nothing to hurry.
+pub fn hints(screen: Screen, steered: bool) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let fits = move |binding: &&Binding| match binding.action {
+        None | Some(Action::Discard) => steered,
+        Some(Action::Faster) => !steered,
+        Some(_) => true,
+    };
+    of(screen).filter(fits).filter(|b| !b.hint.is_empty()).map(|b| (b.shown, b.hint))
 }
 
 #[cfg(test)]

@@ -173,6 +173,16 @@ impl View<'_> {
             .unwrap_or(Phase::Introduction)
     }
 
+    /// The person's share in the present region, as the present phase has it.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        match self.phase() {
+            Phase::Introduction => 1.0,
+            Phase::Main => self.panel.shares.get(self.panel.region).copied().unwrap_or(1.0),
+            Phase::Autonomous | Phase::ZeroControl => 0.0,
+        }
+    }
+
     /// The stage in a few words.
     #[must_use]
     pub fn stage_words(&self) -> String {
@@ -256,7 +266,8 @@ fn everything(pen: &mut Pen<'_>, view: &View<'_>) {
     pen.rule(2 + rows);
     panels::draw(&mut pen.part(0, 3 + rows, width, PANEL_ROWS - 2), view);
     let last = height - 1;
-    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Live));
+    let steered = view.phase().is_steered();
+    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Live, steered));
     overlay::draw(&mut pen.part(0, 2, width, rows), view);
 }
 
@@ -291,7 +302,7 @@ fn scene(pen: &mut Pen<'_>, view: &View<'_>) {
         let left = f64::from(ticks_left) * info.tick_s;
         let bar = width.min(64);
         let mut row = pen.part((width - bar) / 2, height - 1, bar, 1);
-        strip::countdown(&mut row, "WAIT", left, whole, 1);
+        strip::countdown(&mut row, ("WAIT", Role::Wait), left, whole, 1);
     }
 }
 

@@ -47,7 +47,8 @@ impl Role {
 /// Gives each role its style.
 ///
 /// Only the 16 colours that every terminal theme chooses for itself, and of those only ones
-/// that are legible on dark and on light grounds: no grey, no white, no black, no blue.
+/// that are legible on dark and on light grounds: no grey, no white, no black, no blue. Yellow is
+/// pale on light ones; the countdown has its digits beside it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Palette {
     /// 16 colours.
@@ -123,30 +124,25 @@ impl Look {
 fn ascii(glyph: char) -> char {
     match glyph {
         c if c.is_ascii() => c,
-        '─' | '━' | '–' | '−' | '╌' => '-',
+        '─' | '━' | '–' | '−' | '▃' => '-',
         '│' | '┃' | '▌' | '▐' | '┤' | '├' => '|',
-        '┌' | '┐' | '└' | '┘' | '╭' | '╮' | '╯' | '╰' | '┼' | '┬' | '┴' => {
+        '┌' | '┐' | '└' | '┘' | '╭' | '╮' | '╯' | '╰' | '┼' | '┬' | '┴' | '▅' => {
             '+'
         }
         '█' | '▉' | '▊' | '▋' | '▇' => '#',
         '▓' | '▒' => ':',
         '░' | '·' | '▁' => '.',
-        '•' => '*',
+        '•' | '▆' | '✓' | '\u{2801}'..='\u{28ff}' => '*',
         '▂' => '_',
-        '▃' => '-',
         '▄' => '=',
-        '▅' => '+',
-        '▆' => '*',
         '←' => '<',
         '→' => '>',
         '↑' => '^',
         '↓' => 'v',
         '×' => 'x',
-        '✓' => '*',
         '…' => '~',
         '°' => 'd',
         'τ' => 't',
-        '\u{2801}'..='\u{28ff}' => '*',
         _ => '?',
     }
 }

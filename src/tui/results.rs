@@ -115,7 +115,7 @@ fn whole(pen: &mut Pen<'_>, info: &Info, state: &State) {
         Some(message) => {
             pen.text(1, last, message, Role::Alarm);
         }
-        None => help::hints(pen, last, Screen::Results),
+        None => help::hints(pen, last, Screen::Results, true),
     }
     if state.help_open {
         help::draw(pen, Screen::Results, &[]);
@@ -150,7 +150,7 @@ fn statistics(info: &Info, phases: &[Phase]) -> Vec<String> {
         let squares = times.iter().map(|time| (time - average).powi(2)).sum::<f64>();
         let deviation = (squares / (real(times.len()) - 1.0)).sqrt();
         Some(format!(
-            "{:<13} {:>4} rollouts   {} s ± {} s (mean ± sd)",
+            "{:<13}{:>4} rollouts   mean {} s   sd {} s",
             live::phase_word(*phase),
             times.len(),
             fixed(average, 6, 2),
@@ -182,7 +182,7 @@ fn files(pen: &mut Pen<'_>, info: &Info) {
     let longest = info.files.iter().map(|name| name.chars().count()).max().unwrap_or(0) + 2;
     let across = (width / longest.max(1)).max(1);
     for row in info.files.chunks(across) {
-        let row: String = row.iter().map(|name| format!("{name:<longest$}")).collect();
+        let row = row.iter().fold(String::new(), |row, name| row + &format!("{name:<longest$}"));
         lines.push((cut(row.trim_end(), width), Role::Text));
     }
     let height = usize::from(pen.height());

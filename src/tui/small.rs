@@ -29,8 +29,8 @@ pub fn draw(pen: &mut Pen<'_>, view: Option<&View<'_>>) {
             lines.push((format!("pole {}°", signed(angle.to_degrees(), 6, 1)), Role::Text));
         }
         if view.ui.show_progress {
-            let share = snapshot.shares.first().copied().unwrap_or(1.0);
-            lines.push((format!("your share {} %", fixed(share * 100.0, 3, 0)), Role::You));
+            let share = fixed(view.share() * 100.0, 3, 0);
+            lines.push((format!("your share {share} %"), Role::You));
         }
         lines.push(("space stop   q end".to_owned(), Role::Dim));
     }

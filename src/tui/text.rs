@@ -18,7 +18,8 @@ pub const fn real(count: usize) -> f64 {
     count as f64
 }
 
-/// `value` right-aligned in `width` characters; a dash where it is no number or too long.
+/// `value` right-aligned in `width` characters (0: as many as it takes); a dash where it is no
+/// number or too long.
 #[must_use]
 pub fn fixed(value: f64, width: usize, decimals: usize) -> String {
     fit(&format!("{value:.decimals$}"), value, width)
@@ -33,9 +34,9 @@ pub fn signed(value: f64, width: usize, decimals: usize) -> String {
 fn fit(digits: &str, value: f64, width: usize) -> String {
     // "−0.0" flickers beside "+0.0" where nothing moves.
     let is_zero = digits.chars().all(|c| matches!(c, '-' | '+' | '0' | '.'));
-    let digits = match (value.is_finite() && digits.len() <= width, is_zero) {
-        (true, true) if digits.starts_with('+') => digits.replace('+', " "),
-        (true, true) => digits.replace('-', " "),
+    let room = if width == 0 { 12 } else { width };
+    let digits = match (value.is_finite() && digits.len() <= room, is_zero) {
+        (true, true) => digits.replace(['+', '-'], " "),
         (true, false) => digits.replace('-', "−"),
         (false, _) => "–".to_owned(),
     };

@@ -28,7 +28,6 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
     let widest = lines.iter().map(|line| columns(line)).max().unwrap_or(0);
     let (width, height) =
         (widest.max(columns(title) + 2) + 4, u16::try_from(lines.len()).unwrap_or(0) + 2);
-    // Left of the middle: where the cart is most of the time stays visible.
     let x = pen.width().saturating_sub(width) / 2;
     let mut page = pen.part(x, 1, width, height);
     let mut page = page.boxed(title, role);

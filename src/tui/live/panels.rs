@@ -21,15 +21,6 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
     facts(&mut pen.part(left, 0, RIGHT, height), view);
 }
 
-/// The person's share in the present region, as the present phase has it.
-fn share(view: &View<'_>) -> f64 {
-    match view.phase() {
-        Phase::Introduction => 1.0,
-        Phase::Main => view.panel.shares.get(view.panel.region).copied().unwrap_or(1.0),
-        Phase::Autonomous | Phase::ZeroControl => 0.0,
-    }
-}
-
 /// The share's bar, and success with the gate.
 fn sharing(pen: &mut Pen<'_>, view: &View<'_>) {
     let phase = view.phase();
@@ -50,7 +41,7 @@ fn sharing(pen: &mut Pen<'_>, view: &View<'_>) {
     pen.text(VALUES - 1, 0, "▐", Role::Dim);
     pen.text(bar_end, 0, "▌", Role::Dim);
     let bar = bar_end.saturating_sub(VALUES);
-    let share = share(view);
+    let share = view.share();
     let yours = place((share.clamp(0.0, 1.0) * f64::from(bar)).round());
     if phase != Phase::ZeroControl {
         let x = pen.repeat(VALUES, 0, "█", yours, Role::You);
@@ -73,7 +64,8 @@ fn sharing(pen: &mut Pen<'_>, view: &View<'_>) {
 /// Success over the session, its value, and where the gate is.
 fn success(pen: &mut Pen<'_>, view: &View<'_>) {
     let now = view.panel.successes.get(view.panel.region).copied().unwrap_or(0.0);
-    let end = pen.width().saturating_sub(19);
+    let is_wide = pen.width() >= 80;
+    let end = pen.width().saturating_sub(if is_wide { 37 } else { 19 });
     let spark = end.saturating_sub(VALUES + 7);
     pen.text(1, 0, "success", Role::Text);
     let bars = sparkline(&view.history.success, spark.into(), 1.0);
@@ -85,7 +77,8 @@ fn success(pen: &mut Pen<'_>, view: &View<'_>) {
     let (words, role) = match view.panel.gate {
         Some(opened) => {
             let tau = fixed(opened.tau_steps, 0, 0);
-            (format!("open {}, τ {tau}", opened.step), Role::Robot)
+            let words = if is_wide { "gate opened at step" } else { "open" };
+            (format!("{words} {}, τ {tau}", opened.step), Role::Robot)
         }
         None => (format!("gate {} %: not yet", fixed(view.info.gate * 100.0, 0, 0)), Role::Dim),
     };
@@ -151,7 +144,7 @@ fn facts(pen: &mut Pen<'_>, view: &View<'_>) {
 
     let number = |index: usize| seen.state.get(index).copied().unwrap_or(f64::NAN).to_degrees();
     left(pen, 2, "angle", &format!("{}°", signed(number(2), 6, 1)), Role::Text);
-    right(pen, 2, "speed", &format!("{} °/s", signed(number(3), 5, 0)));
+    right(pen, 2, "speed", &format!("{} °/s", signed(number(3), 4, 0)));
     let fields = format!("{:>4}/{}", seen.fields, view.info.field_cap);
     left(pen, 3, "fields", &fields, Role::Text);
     right(pen, 3, "learned", &count(seen.learned, 6));

@@ -90,9 +90,15 @@ fn meter(pen: &mut Pen<'_>, x: u16, width: u16, part: f64) -> u16 {
 }
 
 /// A word, a bar that shrinks, and the seconds left, each in its place.
-pub fn countdown(pen: &mut Pen<'_>, word: &str, left_s: f64, whole_s: f64, decimals: usize) {
+pub fn countdown(
+    pen: &mut Pen<'_>,
+    (word, role): (&str, Role),
+    left_s: f64,
+    whole_s: f64,
+    decimals: usize,
+) {
     let digits = format!("{} s", fixed(left_s, 5, decimals));
-    let x = pen.text(0, 0, word, Role::Wait) + 2;
+    let x = pen.text(0, 0, word, role) + 2;
     let width = pen.width().saturating_sub(x + columns(&digits));
     let part = if whole_s > 0.0 { (left_s / whole_s).clamp(0.0, 1.0) } else { 0.0 };
     let halves = place((part * f64::from(width) * 2.0).round());

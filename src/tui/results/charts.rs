@@ -3,13 +3,13 @@
 use ratatui::style::Style;
 use ratatui::symbols::Marker;
 use ratatui::text::Line;
-use ratatui::widgets::{Axis, Chart, Dataset, GraphType, LegendPosition, Widget};
+use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Widget};
 
 use super::Info;
 use crate::record::EpisodeRow;
 use crate::session::Phase;
 use crate::tui::palette::{Glyphs, Role};
-use crate::tui::pen::Pen;
+use crate::tui::pen::{Pen, columns};
 use crate::tui::text::{moving_mean, real};
 
 type Points = Vec<(f64, f64)>;
@@ -20,6 +20,27 @@ struct Curve {
     graph: GraphType,
     role: Role,
     points: Points,
+}
+
+impl Curve {
+    /// What the curve is drawn with.
+    const fn marker(&self, glyphs: Glyphs) -> Marker {
+        match (self.graph, glyphs) {
+            (GraphType::Line, Glyphs::Braille) => Marker::Braille,
+            (GraphType::Line, Glyphs::Half) => Marker::HalfBlock,
+            _ => Marker::Custom(self.sign()),
+        }
+    }
+
+    /// The sign in the legend, and of single points: another one for each meaning.
+    const fn sign(&self) -> char {
+        match (self.graph, self.role) {
+            (GraphType::Line, _) => '─',
+            (_, Role::Dim) => '·',
+            (_, Role::Go) => '+',
+            _ => '•',
+        }
+    }
 }
 
 /// An axis: its title, where it begins and ends, decimals of its labels.
@@ -59,7 +80,7 @@ pub fn balance(pen: &mut Pen<'_>, info: &Info) {
         },
     ];
     let x = Scale { title: "rollout", from: 1.0, to: count, decimals: 0 };
-    let y = Scale { title: "balance time, s", from: 0.0, to: longest.ceil(), decimals: 0 };
+    let y = Scale { title: "balance time, s", from: 0.0, to: even(longest), decimals: 0 };
     chart(pen, &curves, &x, &y);
 }
 
@@ -97,7 +118,7 @@ pub fn alone(pen: &mut Pen<'_>, info: &Info) {
     match &info.evaluation {
         Some(tenths) if !tenths.is_empty() => {
             let half = width / 2;
-            angles(&mut pen.part(0, 0, half, height), info);
+            angles(&mut pen.part(0, 0, half.saturating_sub(2), height), info);
             learning(&mut pen.part(half, 0, width - half, height), tenths);
         }
         _ => angles(pen, info),
@@ -111,23 +132,28 @@ fn angles(pen: &mut Pen<'_>, info: &Info) {
     let (robot, nobody) = (points(Phase::Autonomous), points(Phase::ZeroControl));
     let all = || robot.iter().chain(&nobody);
     let widest = all().map(|point| point.0.abs()).fold(0.1, f64::max);
-    let longest = all().map(|point| point.1).fold(1.0, f64::max).ceil();
+    let longest = all().map(|point| point.1).fold(1.0, f64::max);
     let curves = [
         Curve { name: "nobody", graph: GraphType::Scatter, role: Role::Dim, points: nobody },
         Curve { name: "robot", graph: GraphType::Scatter, role: Role::Robot, points: robot },
     ];
-    let x = Scale { title: "release angle, °", from: -widest, to: widest, decimals: 1 };
-    let y = Scale { title: "balance time, s", from: 0.0, to: longest, decimals: 0 };
+    let x = Scale { title: "release, °", from: -widest, to: widest, decimals: 1 };
+    let y = Scale { title: "alone, s", from: 0.0, to: even(longest), decimals: 0 };
     chart(pen, &curves, &x, &y);
 }
 
 fn learning(pen: &mut Pen<'_>, tenths: &[(u8, f64)]) {
     let points: Points = tenths.iter().map(|(part, time)| (f64::from(*part), *time)).collect();
-    let longest = points.iter().map(|point| point.1).fold(1.0, f64::max).ceil();
+    let longest = points.iter().map(|point| point.1).fold(1.0, f64::max);
     let curves = [Curve { name: "robot, mean", graph: GraphType::Line, role: Role::Robot, points }];
     let x = Scale { title: "% of main", from: 0.0, to: 100.0, decimals: 0 };
-    let y = Scale { title: "alone, s", from: 0.0, to: longest, decimals: 0 };
+    let y = Scale { title: "alone, s", from: 0.0, to: even(longest), decimals: 0 };
     chart(pen, &curves, &x, &y);
+}
+
+/// The end of an axis whose middle is a whole number, too.
+fn even(longest: f64) -> f64 {
+    (longest / 2.0).ceil() * 2.0
 }
 
 /// `values` as points after the first `before` rollouts.
@@ -136,44 +162,52 @@ fn numbered(values: &[f64], before: f64) -> Points {
 }
 
 fn chart(pen: &mut Pen<'_>, curves: &[Curve], x: &Scale, y: &Scale) {
+    let (width, height) = (pen.width(), pen.height());
     if curves.iter().all(|curve| curve.points.is_empty()) {
-        let middle = pen.height() / 2;
-        pen.centred(middle, "nothing here: this phase did not take place", Role::Dim);
+        pen.centred(height / 2, "nothing here: this phase did not take place", Role::Dim);
         return;
     }
+    let rows = legend(pen, curves, &format!("{} by {}", y.title, x.title));
     let look = pen.look;
-    let marker = match look.glyphs {
-        Glyphs::Braille => Marker::Braille,
-        Glyphs::Half => Marker::HalfBlock,
-        Glyphs::Ascii => Marker::Dot,
-    };
     let data = curves.iter().filter(|curve| !curve.points.is_empty()).map(|curve| {
         Dataset::default()
-            .name(curve.name)
-            .marker(if curve.graph == GraphType::Scatter { Marker::Dot } else { marker })
+            .marker(curve.marker(look.glyphs))
             .graph_type(curve.graph)
             .style(look.palette.style(curve.role))
             .data(&curve.points)
     });
     let dim = look.palette.style(Role::Dim);
-    let area = pen.area();
+    let mut part = pen.part(0, rows, width, height.saturating_sub(rows));
+    let area = part.area();
     Chart::new(data.collect())
-        .style(Style::new())
         .x_axis(axis(x, dim))
         .y_axis(axis(y, dim))
-        .legend_position(Some(LegendPosition::TopRight))
-        .hidden_legend_constraints((
-            ratatui::layout::Constraint::Ratio(1, 2),
-            ratatui::layout::Constraint::Ratio(1, 2),
-        ))
-        .render(area, pen.buffer());
+        .legend_position(None)
+        .render(area, part.buffer());
 }
 
-/// An axis with its title and three labels.
+/// What the chart shows, and what its marks mean; returns the rows that took.
+fn legend(pen: &mut Pen<'_>, curves: &[Curve], title: &str) -> u16 {
+    let entries: Vec<_> = curves
+        .iter()
+        .filter(|curve| !curve.points.is_empty())
+        .map(|curve| (format!("{} {}", curve.sign(), curve.name), curve.role))
+        .collect();
+    let taken: u16 = entries.iter().map(|(entry, _)| columns(entry) + 2).sum();
+    let after_title = pen.text(1, 0, title, Role::Text) + 2;
+    let same_row = after_title + taken <= pen.width();
+    let (mut x, y) = if same_row { (pen.width().saturating_sub(taken), 0) } else { (1, 1) };
+    for (entry, role) in entries {
+        x = pen.text(x, y, &entry, role) + 2;
+    }
+    y + 1
+}
+
+/// An axis with three labels.
 fn axis(scale: &Scale, style: Style) -> Axis<'static> {
     // A single point still needs an axis with a length.
     let to = if scale.to > scale.from { scale.to } else { scale.from + 1.0 };
     let labels = [scale.from, f64::midpoint(scale.from, to), to]
         .map(|value| Line::raw(format!("{value:.*}", scale.decimals).replace('-', "−")));
-    Axis::default().title(scale.title).style(style).bounds([scale.from, to]).labels(labels)
+    Axis::default().style(style).bounds([scale.from, to]).labels(labels)
 }

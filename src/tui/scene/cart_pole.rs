@@ -18,9 +18,17 @@ pub struct Geometry {
 }
 
 /// The drawn cart's width, m: it has no width in the equations.
-const CART_WIDTH_M: f64 = 0.24;
+const CART_WIDTH_M: f64 = 0.3;
 /// The distance of marks along the track, m.
 const MARK_M: f64 = 0.25;
+
+/// The weight at the pole's tip, in radii of the pole.
+const BOB: f64 = 1.8;
+
+/// Half the pole's thickness in dots: to be seen at arm's length.
+fn pole_radius(scale: f64) -> f64 {
+    (0.03 * scale).clamp(1.4, 4.0)
+}
 
 /// Where things are, in dots.
 struct Place {
@@ -44,18 +52,23 @@ impl Place {
         let track = geometry.track_length_m.unwrap_or(2.0 * reach + CART_WIDTH_M);
         // Beside the track stand the squares, four cells and a gap at each end.
         let beside = 2.0 * 5.0 * DOTS_ACROSS;
-        let scale = ((canvas.height() - 12.0) / (1.16 * length))
+        let above_track = canvas.height() - DOTS_DOWN;
+        let rough = above_track / (length + 0.2);
+        // Whole cells, so that the cart's edges are sharp and change no cell above or below.
+        let cart_and_wheels = ((0.13 * rough / DOTS_DOWN).round() * DOTS_DOWN).clamp(8.0, 20.0);
+        let bob = BOB * pole_radius(rough);
+        let scale = ((above_track - cart_and_wheels - bob) / length)
             .min((canvas.width() - beside) / (track + CART_WIDTH_M))
             .min(canvas.width() / (track + 2.0 * reach))
             .max(1e-6);
-        let wheel = (0.025 * scale).clamp(1.0, 5.0);
-        let track_y = canvas.height() - DOTS_DOWN;
+        let wheel = 0.19 * cart_and_wheels;
+        let track_y = above_track;
         let middle_x = (canvas.width() / 2.0).floor();
         let offset = if geometry.track_length_m.is_some() { x_m * scale } else { 0.0 };
-        let cart_height = (0.08 * scale).clamp(3.0, 14.0);
+        let cart_height = cart_and_wheels - 2.0 * wheel;
         Self {
             scale,
-            cart: (middle_x + offset, track_y - 2.0 * wheel - cart_height),
+            cart: (middle_x + offset, track_y - cart_and_wheels),
             cart_half_width: (CART_WIDTH_M / 2.0 * scale).max(4.0),
             cart_height,
             wheel,
@@ -65,7 +78,7 @@ impl Place {
     }
 
     /// The point `length` metres from the pivot at `angle` from upright, to the right.
-    fn from_pivot(&self, length: f64, angle: f64) -> Point {
+    fn beyond_pivot(&self, length: f64, angle: f64) -> Point {
         let (sin, cos) = angle.sin_cos();
         (self.cart.0 + self.scale * length * sin, self.cart.1 - self.scale * length * cos)
     }
@@ -115,8 +128,9 @@ fn track(canvas: &mut Canvas, geometry: &Geometry, place: &Place, x_m: f64) {
 fn limits(canvas: &mut Canvas, geometry: &Geometry, place: &Place) {
     for angle in [-geometry.fail_angle_rad, geometry.fail_angle_rad] {
         let length = geometry.pole_length_m;
-        let (from, to) = (place.from_pivot(0.90 * length, angle), place.from_pivot(length, angle));
-        canvas.capsule(from, to, 0.5, Role::Dim);
+        let (from, to) =
+            (place.beyond_pivot(0.90 * length, angle), place.beyond_pivot(length, angle));
+        canvas.pole(from, to, 0.5, Role::Dim);
     }
 }
 
@@ -126,16 +140,15 @@ fn cart(canvas: &mut Canvas, place: &Place) {
     canvas.rectangle((x - half, y), (x + half, y + place.cart_height), Role::Text);
     for side in [-0.6, 0.6] {
         let middle = (x + side * half, place.track_y - place.wheel);
-        canvas.disc(middle, place.wheel + 0.2, Role::Text);
+        canvas.capsule(middle, middle, place.wheel + 0.2, Role::Text);
     }
 }
 
 fn pole(canvas: &mut Canvas, geometry: &Geometry, place: &Place, theta: f64) {
-    let radius = (0.03 * place.scale).clamp(1.25, 4.0);
-    let bob = 1.8 * radius;
-    let tip = place.from_pivot(geometry.pole_length_m, theta);
+    let radius = pole_radius(place.scale);
+    let tip = place.beyond_pivot(geometry.pole_length_m, theta);
     canvas.pole(place.cart, tip, radius, Role::Text);
-    canvas.disc(tip, bob, Role::Text);
+    canvas.disc(tip, BOB * radius, Role::Text);
 }
 
 /// The squares at the ends of the track, with their word below.
@@ -152,5 +165,53 @@ fn squares(canvas: &mut Canvas, geometry: &Geometry, at: &Place, light: Light) {
             canvas.text(column, row, light.square(), light.role());
         }
         canvas.text(column, word_row, light.word(), light.role());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tui::palette::Glyphs;
+
+    /// A point in dots is inside the picture.
+    fn is_inside(canvas: &Canvas, (x, y): Point) -> bool {
+        (0.0..=canvas.width()).contains(&x) && (0.0..=canvas.height()).contains(&y)
+    }
+
+    #[test]
+    fn the_whole_pole_is_in_the_picture_wherever_a_rollout_can_go() {
+        for (columns, rows) in [(80, 14), (80, 19), (120, 30), (200, 50), (300, 20)] {
+            for pole_length_m in [0.3, 0.6, 1.0, 2.0] {
+                let canvas = Canvas::new(columns, rows, Glyphs::Braille);
+                let fail = 30_f64.to_radians();
+                let geometry =
+                    Geometry { pole_length_m, track_length_m: Some(1.0), fail_angle_rad: fail };
+                for (x, angle) in [(0.0, 0.0), (0.5, fail), (-0.5, -fail), (0.5, -fail)] {
+                    let place = Place::new(&canvas, &geometry, x);
+                    let tip = place.beyond_pivot(pole_length_m, angle);
+                    assert!(
+                        is_inside(&canvas, tip),
+                        "{columns}x{rows}, {pole_length_m} m: {tip:?}"
+                    );
+                    assert!(is_inside(&canvas, place.cart));
+                }
+                // The room is used: the pole is high, or the track is wide.
+                let place = Place::new(&canvas, &geometry, 0.0);
+                let used = (place.scale * pole_length_m / canvas.height())
+                    .max(place.scale * (1.0 + CART_WIDTH_M) / canvas.width());
+                assert!(used > 0.6, "{columns}x{rows}, {pole_length_m} m: {used}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_length_is_as_long_across_as_up() {
+        let canvas = Canvas::new(80, 14, Glyphs::Braille);
+        let geometry =
+            Geometry { pole_length_m: 1.0, track_length_m: Some(1.0), fail_angle_rad: 0.5 };
+        let (left, right) =
+            (Place::new(&canvas, &geometry, -0.5), Place::new(&canvas, &geometry, 0.5));
+        let up = left.cart.1 - left.beyond_pivot(1.0, 0.0).1;
+        assert!((right.cart.0 - left.cart.0 - up).abs() < 1e-9);
     }
 }
