@@ -77,7 +77,7 @@ impl View<'_> {
         self.how(pen);
         self.picture(pen, height);
         self.below(pen, height);
-        help::hints(pen, height - 1, Screen::Setup);
+        help::hints(pen, height - 1, Screen::Setup, true);
     }
 
     /// How the value of `field` is shown.
