@@ -10,7 +10,7 @@ use coadapt::tui::setup::{self, Extras, Field, Reaction, Setup, Shelf};
 use proptest::prelude::*;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
 /// A screen with someone who carries out what it asks for.
 struct Desk {
@@ -154,6 +154,36 @@ fn a_plain_palette_and_7_bit_glyphs_show_the_same() {
 }
 
 #[test]
+fn the_focus_is_seen_without_colour() {
+    let mut desk = Desk::nowhere();
+    let look = Look { palette: Palette::Plain, ..Look::default() };
+    for field in Field::ALL.into_iter().filter(|f| !matches!(f, Field::Task | Field::Unfinished)) {
+        match field {
+            Field::Skill | Field::Script => {
+                desk.go(Field::Operator).right(1);
+            }
+            Field::Policy => {
+                desk.go(Field::Introduction).type_text(" ").go(Field::Main).type_text(" ");
+            }
+            _ => {}
+        }
+        desk.go(field);
+        if field == Field::Script {
+            // A file is missing so far, and that would be marked too.
+            desk.type_text("hands.csv");
+        }
+        let picture = desk.picture_on(80, 24, look);
+        let buffer = picture.buffer();
+        let marked: Vec<u16> = (0..24).filter(|y| buffer[(1, *y)].symbol() == "›").collect();
+        let reversed = |y: u16| {
+            (0..80).any(|x| buffer[(x, y)].modifier.contains(ratatui::style::Modifier::REVERSED))
+        };
+        assert_eq!(marked.len(), 1, "{field:?}");
+        assert!((0..18).all(|y| reversed(y) == marked.contains(&y)), "{field:?}");
+    }
+}
+
+#[test]
 fn a_wrong_subject_is_told_at_once_and_does_not_begin() {
     let mut desk = Desk::nowhere();
     desk.go(Field::Subject).type_text("S/7 q");
@@ -250,6 +280,8 @@ fn profiles_are_saved_never_over_another_unasked_and_opened_again() {
     desk.press(KeyCode::Char('s'));
     desk.press(KeyCode::Enter);
     assert!(desk.shows("Replace it?"));
+    let held = KeyEvent { kind: KeyEventKind::Repeat, ..KeyEvent::from(KeyCode::Enter) };
+    assert_eq!(desk.key(held), Reaction::Stay);
     desk.press(KeyCode::Esc);
     assert_eq!(std::fs::read_to_string(folder.path().join("mine.ron")).unwrap(), text);
     desk.press(KeyCode::Char('s'));

@@ -144,16 +144,18 @@ impl Setup {
     /// operator and the like stay; the changes to the profile before are kept for when it is
     /// opened again.
     pub fn open(&mut self, name: &str, document: &Document) {
-        self.prompt = None;
+        let asked = self.prompt.take();
+        let is_saved = matches!(asked, Some(Prompt::Save(_) | Prompt::Overwrite(_)));
         self.refused = false;
         self.drafts.fresh = true;
         self.asked = Some(name.to_owned());
         match without_sets(document).read() {
             Ok(base) => {
-                let sets = self.kept.remove(name).unwrap_or_default();
+                // Saved changes are in the text now.
+                let sets = self.kept.remove(name).filter(|_| !is_saved).unwrap_or_default();
                 let before = std::mem::replace(&mut self.order.profile, name.to_owned());
                 let left = std::mem::replace(&mut self.order.sets, sets);
-                if before != name && !left.is_empty() {
+                if before != name && !left.is_empty() && !is_saved {
                     self.kept.insert(before, left);
                 }
                 self.base = base;

@@ -6,7 +6,6 @@ use serde::Serialize;
 use tui_input::Input;
 
 use super::{Field, Setup, without_sets};
-use crate::learner;
 use crate::operator::Choice;
 use crate::operator::simulated::{Kind, Skill};
 use crate::profile::{Document, Experiment, Fault, Order, Profile, WantedMode};
@@ -174,18 +173,15 @@ impl Setup {
 
     /// Main ends after a number of rollouts, or, written with an `s`, after a time.
     fn change_main(&mut self, text: &str) {
-        match text.trim().strip_suffix('s') {
-            Some(duration) => {
-                self.change(MAIN_DURATION, duration.trim());
-                self.change(MAIN_ROLLOUTS, "None");
-            }
-            None => {
-                self.change(MAIN_ROLLOUTS, text);
-                if self.base.session.main_rollouts.is_none() {
-                    self.change(MAIN_DURATION, "None");
-                } else {
-                    self.restore(MAIN_DURATION);
-                }
+        if let Some(duration) = text.trim().strip_suffix('s') {
+            self.change(MAIN_DURATION, duration.trim());
+            self.change(MAIN_ROLLOUTS, "None");
+        } else {
+            self.change(MAIN_ROLLOUTS, text);
+            if self.base.session.main_rollouts.is_none() {
+                self.change(MAIN_DURATION, "None");
+            } else {
+                self.restore(MAIN_DURATION);
             }
         }
     }
@@ -234,8 +230,8 @@ impl Setup {
                 self.change("mode", &word(&mode));
             }
             Field::Learner => {
-                let kind = next(&LEARNERS, &self.profile.learner.kind, forward);
-                self.change("learner.kind", &word(&kind));
+                let kind = word(&self.profile.learner.kind);
+                self.change("learner.kind", next(&LEARNERS, &kind.as_str(), forward));
             }
             Field::Operator => {
                 let words = next(&OPERATORS, &self.operator_word(), forward);
@@ -381,6 +377,7 @@ pub(super) fn allowed(document: &Document, key: &str) -> String {
 }
 
 /// The pole's length, m, where the plant has one.
+#[expect(clippy::unnecessary_wraps, reason = "so far all plants have a pole")]
 pub(super) fn pole_length(profile: &Profile) -> Option<f64> {
     match &profile.experiment {
         Experiment::Balance { plant, .. } => Some(plant.pole_length_m),
@@ -399,9 +396,10 @@ pub(super) fn sensitivity_level(sensitivity: f64) -> f64 {
     (sensitivity.log10() * 20.0).round().clamp(-LEVELS, LEVELS)
 }
 
-pub(super) const MODES: [WantedMode; 3] =
+const MODES: [WantedMode; 3] =
     [WantedMode::Simultaneous, WantedMode::Sequential, WantedMode::Assigned];
-const LEARNERS: [learner::Kind; 1] = [learner::Kind::Rfwr];
+/// The words of the learners, as profiles spell them.
+const LEARNERS: [&str; 1] = ["rfwr"];
 const OPERATORS: [&str; 4] = ["keyboard", "simulated", "script", "none"];
 
 /// The one of `all` after `current`, or before it, all around.

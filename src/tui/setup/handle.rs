@@ -35,7 +35,7 @@ impl Setup {
         if let Some(reaction) = self.edit_text(key) {
             return reaction;
         }
-        if key.code == KeyCode::Char(' ') {
+        if key.code == KeyCode::Char(' ') && key.kind == KeyEventKind::Press {
             self.switch();
             return Reaction::Stay;
         }
@@ -192,6 +192,8 @@ impl Setup {
     /// Takes a key while `prompt` is asked.
     fn answer(&mut self, mut prompt: Prompt, key: KeyEvent) -> Reaction {
         match (key.code, &mut prompt) {
+            // A key held too long confirms nothing.
+            (KeyCode::Enter, _) if key.kind != KeyEventKind::Press => {}
             (KeyCode::Esc, _) => {
                 self.drafts.fresh = true;
                 return Reaction::Stay;

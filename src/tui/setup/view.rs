@@ -64,7 +64,12 @@ struct View<'a> {
 impl View<'_> {
     fn draw(&self, pen: &mut Pen<'_>, height: u16) {
         pen.text(1, 0, "coadapt", Role::Strong);
-        pen.text_until(pen.width() - 1, 0, "the laboratory of simultaneous learning", Role::Dim);
+        pen.text_until(
+            pen.width() - 1,
+            0,
+            "the terminal laboratory for simultaneous human–robot learning",
+            Role::Dim,
+        );
         self.tabs(pen);
         self.what(pen);
         self.phases(pen, 7);
@@ -72,7 +77,7 @@ impl View<'_> {
         self.how(pen);
         self.picture(pen, height);
         self.below(pen, height);
-        help::hints(pen, height - 1, Screen::Setup, false);
+        help::hints(pen, height - 1, Screen::Setup, true);
     }
 
     /// How the value of `field` is shown.
@@ -279,7 +284,7 @@ impl View<'_> {
         if setup.is_autonomous_alone() {
             self.typed(pen, (VALUE, 15, BESIDE - VALUE - 1), Field::Policy);
         } else {
-            pen.text(VALUE, 15, "that of main; else autonomous alone", Role::Dim);
+            pen.text(VALUE, 15, "main's; choose for autonomous alone", Role::Dim);
         }
 
         self.label(pen, 16, "seed", &[Field::Seed]);
@@ -320,21 +325,16 @@ impl View<'_> {
     /// Below the form: changes, what is asked or wrong, and the equal command.
     fn below(&self, pen: &mut Pen<'_>, height: u16) {
         let lines = command(&self.setup.order.command_line(), usize::from(pen.width() - VALUE - 1));
-        let room = 2 + (height - 24) / 4;
-        let command_rows = u16::try_from(lines.len()).unwrap_or(room).clamp(2, room);
-        let command_top = height - 1 - command_rows;
-        self.changes(pen, command_top - 3);
-        let y = command_top - 2;
-        if let Some(prompt) = &self.setup.prompt {
-            self.prompt(pen, y, prompt);
-        } else if self.setup.trying_hands {
-            self.hands(pen, y);
-        } else if let Some((message, role)) = self.message() {
-            self.say(pen, y, &message, role);
-        } else {
-            self.unfinished(pen, y);
-        }
-        let rows = usize::from(command_rows);
+        let bottom = height - 1;
+        let room = 2 + (height - small::LEAST_HEIGHT) / 4;
+        let count = u16::try_from(lines.len()).unwrap_or(u16::MAX);
+        let y = bottom - count.clamp(2, room) - 2;
+        self.changes(pen, y - 1);
+        let is_quiet = !self.asks(pen, y);
+        // Where nothing else is said, the command has one row more.
+        let rows = count.clamp(2, room + u16::from(is_quiet));
+        let command_top = bottom - rows;
+        let rows = usize::from(rows);
         let shown = window(lines.len(), rows, self.extras.time_s);
         pen.text(LABEL, command_top, "equal to", Role::Dim);
         if lines.len() > rows {
@@ -347,6 +347,22 @@ impl View<'_> {
         for (line, y) in skipped.zip(command_top..) {
             pen.text(VALUE, y, line, role);
         }
+    }
+
+    /// What is asked, tried, wrong or to be resumed, in two rows from `y` on; returns
+    /// whether it may need the second.
+    fn asks(&self, pen: &mut Pen<'_>, y: u16) -> bool {
+        if let Some(prompt) = &self.setup.prompt {
+            self.prompt(pen, y, prompt);
+        } else if self.setup.trying_hands {
+            self.hands(pen, y);
+        } else if let Some((message, role)) = self.message() {
+            say(pen, y, &message, role);
+        } else {
+            self.unfinished(pen, y);
+            return false;
+        }
+        true
     }
 
     /// The profile and what was changed in it.
@@ -375,17 +391,6 @@ impl View<'_> {
             (_, Some(message)) => Some((message.clone(), Role::Strong)),
             (Some((_, fault)), None) => Some((fault.clone(), Role::Wait)),
             (None, None) => None,
-        }
-    }
-
-    /// Writes `message` in two lines from `y` on.
-    fn say(&self, pen: &mut Pen<'_>, y: u16, message: &str, role: Role) {
-        let width = pen.width() - LABEL - 1;
-        let lines = wrapped(message, usize::from(width));
-        let (first, rest) = lines.split_first().map_or(("", &[][..]), |(f, r)| (f.as_str(), r));
-        note(pen, LABEL, y, LABEL + width, first, role);
-        if !rest.is_empty() {
-            note(pen, LABEL, y + 1, LABEL + width, &rest.join(" "), role);
         }
     }
 
@@ -448,5 +453,16 @@ impl View<'_> {
             let which = format!("{} of {}", self.setup.cut_off + 1, all.len());
             pen.text(end + 3, y, &which, Role::Dim);
         }
+    }
+}
+
+/// Writes `message` in two lines from `y` on.
+fn say(pen: &mut Pen<'_>, y: u16, message: &str, role: Role) {
+    let width = pen.width() - LABEL - 1;
+    let lines = wrapped(message, usize::from(width));
+    let (first, rest) = lines.split_first().map_or(("", &[][..]), |(f, r)| (f.as_str(), r));
+    note(pen, LABEL, y, LABEL + width, first, role);
+    if !rest.is_empty() {
+        note(pen, LABEL, y + 1, LABEL + width, &rest.join(" "), role);
     }
 }
