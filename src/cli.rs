@@ -45,7 +45,6 @@ pub enum Command {
 
 /// The words of `run`.
 #[derive(Args, Debug)]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Run {
     /// A name in `profiles/` or built in, or a path.
     #[arg(required_unless_present = "resume")]

@@ -6,7 +6,6 @@ use std::fs;
 
 use coadapt::learner::{Kernel, Learner, Model, Params};
 use coadapt::record::policy::{Policy, file_name, read_policy, write_policy};
-use coadapt::session::Trial;
 use coadapt::sharing::Mode;
 
 /// Where the cart-pole is at tick `k` of a made-up ride, and what a person does there.
@@ -35,8 +34,6 @@ fn policy(learner: Model) -> Policy<Model> {
         task: "balance".to_owned(),
         preset: "thesis".to_owned(),
         mode: Mode::Simultaneous,
-        subject: "S07".parse().unwrap(),
-        trial: Trial(3),
         percent: 100,
         features: ["x", "x_dot", "theta", "theta_dot"].map(str::to_owned).to_vec(),
         action_limit: 10.0,

@@ -1,5 +1,12 @@
 //! The set-up screen as it looks and as it is used, by keys alone.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "helpers of tests may fail as tests do"
+)]
+
 use std::path::{Path, PathBuf};
 
 use coadapt::profile::{self, Document, Order};
