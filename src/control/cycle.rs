@@ -108,6 +108,7 @@ pub struct Cycle<W> {
     pub(super) episodes: Vec<EpisodeRow>,
     pub(super) cause: Option<String>,
     pub(super) seen: Snapshot,
+    wanted_speed: f64,
     lateness_us: Option<Histogram<u64>>,
 }
 
@@ -137,6 +138,7 @@ impl<W: Witness> Cycle<W> {
             episodes: Vec::new(),
             cause: None,
             seen: Snapshot::before(stage),
+            wanted_speed: 1.0,
             lateness_us: Histogram::new_with_max(60_000_000, 3).ok(),
         };
         let is_new = from.is_none();
@@ -346,7 +348,7 @@ impl<W: Witness> Cycle<W> {
                     Event::Abort
                 }
                 Command::Speed(speed) => {
-                    self.seen.speed = if speed > 0.0 { speed } else { 1.0 };
+                    self.wanted_speed = if speed > 0.0 { speed } else { 1.0 };
                     continue;
                 }
             };
@@ -358,7 +360,7 @@ impl<W: Witness> Cycle<W> {
     fn speed(&self) -> f64 {
         match self.stage {
             Stage::Hold { moment, .. } | Stage::Running(moment) if !moment.phase.is_steered() => {
-                self.seen.speed
+                self.wanted_speed
             }
             _ => 1.0,
         }
@@ -388,6 +390,7 @@ impl<W: Witness> Cycle<W> {
 
     /// Shows this tick to whoever looks.
     fn publish(&mut self) {
+        self.seen.speed = self.speed();
         let Some(publisher) = &self.crew.publisher else { return };
         let phase = self.stage.moment().map(|moment| moment.phase);
         for region in 0..self.crew.task.regions().len().min(MOST_REGIONS) {

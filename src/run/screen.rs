@@ -130,6 +130,7 @@ impl Stage {
             watcher: session.watcher.clone(),
             frames: session.frames.clone(),
             screen: session.profile().screen.clone(),
+            notice: (!session.notices.is_empty()).then(|| session.notices.join("; ")),
         };
         self.shutdown.abort_on_signal(running.watcher.clone());
         self.last = None;

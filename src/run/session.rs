@@ -137,6 +137,7 @@ impl Session {
         let plan = Plan::new(&profile.session, profile.tick(), seed, company.is_attended());
         let fresh = fresh_learner(&profile)?;
 
+        let cut_off = cut_off_notice(order, &profile);
         let created = Folder::create(
             &order.logs,
             &order.subject,
@@ -180,7 +181,7 @@ impl Session {
         .map_err(|error| RunError::Failed(error.to_string()))?;
         let learner = policy.map_or_else(|| fresh.clone(), |policy| policy.learner);
         let parts = Parts { profile, sidecar, folder, plan, fresh, hand, recorder };
-        let notices = created.notice.into_iter().collect();
+        let notices = created.notice.into_iter().chain(cut_off).collect();
         Ok(parts.assemble(learner, None, Vec::new(), company, notices))
     }
 
@@ -407,6 +408,20 @@ fn last_policy(order: &Order, profile: &Profile) -> Result<PathBuf, RunError> {
                 order.logs.display()
             ))
         })
+}
+
+/// That the subject's latest session of this task was cut off, and how to go on with it.
+fn cut_off_notice(order: &Order, profile: &Profile) -> Option<String> {
+    let cut = folder::unfinished(&order.logs)
+        .into_iter()
+        .find(|cut| cut.subject == order.subject && cut.task == profile.experiment.name())?;
+    Some(format!(
+        "trial {} was cut at {} {}; to go on with it: coadapt run --resume {}",
+        cut.trial,
+        cut.phase,
+        cut.episode,
+        cut.path.display()
+    ))
 }
 
 /// The mode that the subject had, or the one that fewer subjects have.

@@ -26,6 +26,8 @@ pub struct Running {
     pub frames: Arc<AtomicU64>,
     /// What the profile says about the screen.
     pub screen: profile::Screen,
+    /// What the person should know before it begins.
+    pub notice: Option<String>,
 }
 
 /// Does what the screens cannot: starts sessions, looks at the disk, hears signals.

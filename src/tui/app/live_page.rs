@@ -33,6 +33,8 @@ struct Page {
     sample_due: Seconds,
     /// Whether `q` was pressed once.
     asked_to_end: bool,
+    /// How fast the session should run where nobody steers.
+    speed: f64,
     /// Why the page is left once the session is over.
     leaving: Option<End>,
 }
@@ -49,6 +51,7 @@ pub(super) fn show(
     let ui = Ui {
         show_progress: running.screen.show_progress,
         subject_view: running.screen.subject_view,
+        message: running.notice.clone(),
         look: look(running.screen.glyphs),
         ..Ui::default()
     };
@@ -62,6 +65,7 @@ pub(super) fn show(
         panel_due,
         sample_due,
         asked_to_end: false,
+        speed: SPEEDS[0],
         leaving: None,
     };
     loop {
@@ -93,6 +97,12 @@ pub(super) fn show(
     }
 }
 
+/// Whether two stages differ in nothing but their counts.
+fn is_same_page(a: Stage, b: Stage) -> bool {
+    let rollout = |stage: Stage| stage.moment().map(|moment| (moment.phase, moment.rollout));
+    std::mem::discriminant(&a) == std::mem::discriminant(&b) && rollout(a) == rollout(b)
+}
+
 impl Page {
     fn draw(&mut self, screen: &mut Screen, now: Seconds) {
         let scene = self.running.watcher.look();
@@ -106,7 +116,9 @@ impl Page {
             self.sample(&scene);
         }
         // What changes the layout must not lag behind the scene.
-        self.panel.stage = scene.stage;
+        if !is_same_page(self.panel.stage, scene.stage) {
+            self.panel = scene;
+        }
         let known = screen.feed().hands().knowledge().words();
         if self.running.info.operator.starts_with("keyboard") {
             self.running.info.operator = format!("keyboard, releases {known}");
@@ -148,14 +160,15 @@ impl Page {
             _ => keys::Screen::Live,
         };
         let Some(action) = keys::action(here, key) else {
-            if key.is_press() && self.asked_to_end {
+            if key.is_press() {
                 self.forget_question();
             }
             return;
         };
-        if action != Action::Quit && self.asked_to_end {
+        if action != Action::Quit {
+            let was_asked = self.asked_to_end;
             self.forget_question();
-            if action != Action::QuitNow {
+            if was_asked && action != Action::QuitNow && action != Action::Stop {
                 return;
             }
         }
@@ -193,9 +206,13 @@ impl Page {
     }
 
     fn faster(&mut self) {
-        let now = self.running.watcher.look().speed;
-        let next = SPEEDS.iter().copied().find(|speed| *speed > now).unwrap_or(SPEEDS[0]);
-        self.ask(Command::Speed(next));
+        let steered = |stage: Stage| stage.moment().is_none_or(|m| m.phase.is_steered());
+        if steered(self.running.watcher.look().stage) {
+            return;
+        }
+        let faster = SPEEDS.iter().copied().find(|speed| *speed > self.speed);
+        self.speed = faster.unwrap_or(SPEEDS[0]);
+        self.ask(Command::Speed(self.speed));
     }
 
     /// Ends the session, and then the program.

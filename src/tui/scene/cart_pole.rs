@@ -22,6 +22,9 @@ const CART_WIDTH_M: f64 = 0.3;
 /// The distance of marks along the track, m.
 const MARK_M: f64 = 0.25;
 
+/// A picture lower than this, in cells, is an ornament without words.
+const ROOM_FOR_WORDS: u16 = 8;
+
 /// The weight at the pole's tip, in radii of the pole.
 const BOB: f64 = 1.8;
 
@@ -100,7 +103,9 @@ pub fn draw(pen: &mut Pen<'_>, geometry: &Geometry, state: &[f64], light: Light)
     limits(&mut canvas, geometry, &place);
     cart(&mut canvas, &place);
     pole(&mut canvas, geometry, &place, theta);
-    squares(&mut canvas, geometry, &place, light);
+    if pen.height() >= ROOM_FOR_WORDS {
+        squares(&mut canvas, geometry, &place, light);
+    }
     canvas.draw(pen);
 }
 
