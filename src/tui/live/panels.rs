@@ -140,7 +140,7 @@ fn facts(pen: &mut Pen<'_>, view: &View<'_>) {
     pen.text(0, 1, "last 10", Role::Dim);
     pen.text(8, 1, &sparkline(last, 10, longest), Role::Text);
     let recent = mean(last).unwrap_or(f64::NAN);
-    pen.text_until(30, 1, &format!("mean {} s", fixed(recent, 5, 2)), Role::Text);
+    pen.text_until(30, 1, &format!("mean {}", fixed(recent, 5, 2)), Role::Text);
 
     let number = |index: usize| seen.state.get(index).copied().unwrap_or(f64::NAN).to_degrees();
     left(pen, 2, "angle", &format!("{}°", signed(number(2), 6, 1)), Role::Text);
