@@ -15,6 +15,7 @@ mod error;
 pub mod evaluation;
 mod finite;
 pub mod folder;
+mod names;
 pub mod policy;
 pub mod reader;
 pub mod sidecar;
@@ -76,6 +77,29 @@ pub struct StepRow<Name = &'static str> {
     pub region: Option<Name>,
     /// How late the tick began, µs; 0 on virtual time.
     pub lateness_us: u32,
+}
+
+impl<Name> StepRow<Name> {
+    /// The row of a rollout's ending state: no action follows it.
+    #[must_use]
+    pub const fn ending(phase: Phase, episode: u32, step: u32, t: f64, state: State) -> Self {
+        Self {
+            phase,
+            episode,
+            step,
+            t,
+            state,
+            u_human: None,
+            u_machine: None,
+            share: None,
+            u: None,
+            u_applied: None,
+            reward: None,
+            success: None,
+            region: None,
+            lateness_us: 0,
+        }
+    }
 }
 
 /// A row of `episodes.csv`: one rollout.

@@ -101,22 +101,14 @@ impl<W: Witness> Cycle<W> {
     /// A rollout is over: its ending state, its row, its policies.
     fn close(&mut self, moment: Moment, end: End) {
         let state = self.crew.backend.sense().state;
-        self.crew.witness.step(&StepRow {
-            phase: moment.phase,
-            episode: moment.rollout,
-            step: moment.step,
-            t: f64::from(moment.step) * self.rules.tick.0,
+        let t = f64::from(moment.step) * self.rules.tick.0;
+        self.crew.witness.step(&StepRow::ending(
+            moment.phase,
+            moment.rollout,
+            moment.step,
+            t,
             state,
-            u_human: None,
-            u_machine: None,
-            share: None,
-            u: None,
-            u_applied: None,
-            reward: None,
-            success: None,
-            region: None,
-            lateness_us: 0,
-        });
+        ));
         let row = self.episode_row(moment, end);
         self.crew.witness.episode(&row);
         if let Some(publisher) = &self.crew.publisher {

@@ -6,7 +6,8 @@ use std::path::Path;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::folder::{self, SESSION};
+use super::folder;
+use super::names::SESSION;
 use super::sidecar::{Sidecar, read_sidecar};
 use crate::session::{Phase, Subject};
 use crate::sharing::Mode;

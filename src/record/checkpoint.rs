@@ -7,15 +7,13 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::document::{self, Document};
-use super::folder::{CHECKPOINT, EPISODES, EVENTS, Folder, SESSION, STEPS};
+use super::folder::Folder;
+use super::names::{CHECKPOINT, CHECKPOINT_KIND, EPISODES, EVENTS, SESSION, STEPS};
 use super::sidecar::{Resumption, Sidecar, Status};
 use super::writer::{Manner, Recorder};
 use super::{EpisodeRow, Error, EventRow, Storable, reader, table};
 use crate::session::Moment;
 use crate::sharing::Sharing;
-
-/// The word for checkpoints in their files.
-pub(super) const KIND: &str = "checkpoint";
 
 /// All that a session needs to go on with the rollout at `moment`. The random streams
 /// follow from the seed and the moment.
@@ -46,7 +44,7 @@ pub struct Checkpoint<M> {
 }
 
 impl<M> Document for Checkpoint<M> {
-    const KIND: &'static str = KIND;
+    const KIND: &'static str = CHECKPOINT_KIND;
 }
 
 /// Reads a checkpoint.

@@ -7,18 +7,11 @@ use std::time::SystemTime;
 
 use serde::Deserialize;
 
+use super::Error;
 use super::document::{self, Document};
+use super::names::{CHECKPOINT, CHECKPOINT_KIND, SESSION, STEPS};
 use super::sidecar::{Sidecar, Status, read_sidecar};
-use super::{Error, checkpoint};
 use crate::session::{Moment, Phase, Subject, Trial};
-
-/// The folder's files.
-pub(super) const SESSION: &str = "session.json";
-pub(super) const STEPS: &str = "steps.csv";
-pub(super) const EPISODES: &str = "episodes.csv";
-pub(super) const EVENTS: &str = "events.csv";
-pub(super) const CHECKPOINT: &str = "checkpoint.json";
-pub(super) const EVALUATION: &str = "evaluation.csv";
 
 /// A session's folder. As long as this lives, no other process records into it.
 #[derive(Debug)]
@@ -203,7 +196,7 @@ struct Standing {
 }
 
 impl Document for Standing {
-    const KIND: &'static str = checkpoint::KIND;
+    const KIND: &'static str = CHECKPOINT_KIND;
 }
 
 /// The sessions in `logs` that are not complete, have a readable checkpoint and are not

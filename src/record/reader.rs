@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde::de::IntoDeserializer;
 use serde::de::value::Error as WordError;
 
-use super::writer::{EPISODE_COLUMNS, EVENT_COLUMNS, STEP_COLUMNS};
+use super::names::{EPISODE_COLUMNS, EVENT_COLUMNS, STEP_COLUMNS};
 use super::{EpisodeRow, Error, EvaluationRow, EventRow, StepRow, table};
 use crate::signal::State;
 

@@ -13,7 +13,11 @@ use std::thread::{self, JoinHandle};
 
 use super::document;
 use super::evaluation::write_evaluation;
-use super::folder::{CHECKPOINT, EPISODES, EVALUATION, EVENTS, Folder, SESSION, STEPS};
+use super::folder::Folder;
+use super::names::{
+    CHECKPOINT, EPISODE_COLUMNS, EPISODES, EVALUATION, EVENT_COLUMNS, EVENTS, SESSION,
+    STEP_COLUMNS, STEPS,
+};
 use super::policy;
 use super::table::Table;
 use super::{
@@ -22,40 +26,6 @@ use super::{
 
 /// Messages that may wait: at 50 steps a second more than two minutes of a stalled disk.
 const QUEUE: usize = 8192;
-
-/// The columns of `episodes.csv`.
-pub(super) const EPISODE_COLUMNS: [&str; 11] = [
-    "phase",
-    "episode",
-    "start",
-    "steps",
-    "duration_s",
-    "end",
-    "return",
-    "mean_reward",
-    "share",
-    "success",
-    "receptive_fields",
-];
-
-/// The columns of `events.csv`.
-pub(super) const EVENT_COLUMNS: [&str; 6] = ["time", "phase", "episode", "step", "event", "cause"];
-
-/// The columns of `steps.csv` before and after the state's.
-pub(super) const STEP_COLUMNS: ([&str; 4], [&str; 9]) = (
-    ["phase", "episode", "step", "t"],
-    [
-        "u_human",
-        "u_machine",
-        "share",
-        "u",
-        "u_applied",
-        "reward",
-        "success",
-        "region",
-        "lateness_us",
-    ],
-);
 
 /// How the writer treats the one who feeds it, and the disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -365,22 +335,7 @@ mod tests {
             path: PathBuf::new(),
         };
         for step in 0..5 {
-            recorder.step(StepRow {
-                phase: Phase::Main,
-                episode: 1,
-                step,
-                t: 0.0,
-                state: State::default(),
-                u_human: None,
-                u_machine: None,
-                share: None,
-                u: None,
-                u_applied: None,
-                reward: None,
-                success: None,
-                region: None,
-                lateness_us: 0,
-            });
+            recorder.step(StepRow::ending(Phase::Main, 1, step, 0.0, State::default()));
         }
         assert_eq!(recorder.lost(), 3);
         drop(recorder);
