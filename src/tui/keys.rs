@@ -126,7 +126,7 @@ pub const BINDINGS: &[Binding] = {
         bind(Setup, &[Char('r')], "r", "resume", "resume the session that was cut off", A::Resume),
         elsewhere(Setup, "letters", "", "type in a text field; Tab or Esc leaves it"),
         bind(Setup, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
-        bind(Setup, &[Char('q'), Esc], "q", "quit", "quit", A::Quit),
+        bind(Setup, &[Char('q')], "q", "quit", "quit", A::Quit),
         //
         bind(Briefing, &[Enter, Char(' ')], "Enter", "go on", "read, rested: go on", A::Begin),
         bind(Briefing, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
