@@ -439,7 +439,7 @@ fn simulate_prints_the_plants_own_steps() {
     let desk = Desk::new();
     let forces: Vec<f64> = (0..60).map(|k| 4.0 * (f64::from(k) * 0.3).sin()).collect();
     let table: String = forces.iter().fold("u\n".to_owned(), |all, u| format!("{all}{u}\n"));
-    desk.write("forces.csv", &table);
+    fs::write(desk.at("forces.csv"), &table).unwrap();
     let printed = desk.succeed(
         "simulate balance --start 0,0,0.05,0 --actions forces.csv \
          --set plant.friction_noise_per_s=0 --set plant.pole_length_m=0.6",
@@ -465,7 +465,7 @@ fn profiles_are_listed_shown_and_checked() {
     assert!(desk.succeed("profile list").lines().any(|line| line.starts_with("balance ")));
     let shown = desk.succeed("profile show balance --set plant.pole_length_m=0.6");
     assert!(shown.contains("pole_length_m: 0.6"), "{shown}");
-    desk.write("own.ron", &shown);
+    fs::write(desk.at("own.ron"), &shown).unwrap();
     assert!(desk.succeed("profile check own.ron").contains("own.ron is a good profile"));
     desk.succeed("run own.ron --headless --operator none --rollouts 1 --phases main --seed 1");
 }
@@ -473,7 +473,7 @@ fn profiles_are_listed_shown_and_checked() {
 #[test]
 fn a_script_steers_by_its_table() {
     let desk = Desk::new();
-    desk.write("pushes.csv", "t,u,phase,episode\n0,1.5,,\n0.1,-2,,\n0,3,main,2\n");
+    fs::write(desk.at("pushes.csv"), "t,u,phase,episode\n0,1.5,,\n0.1,-2,,\n0,3,main,2\n").unwrap();
     desk.succeed(
         "run balance --headless --operator script:pushes.csv --seed 1 --rollouts 2 \
          --set session.introduction_rollouts=1 --phases introduction,main",

@@ -21,13 +21,6 @@ impl Desk {
         self.folder.path().join(name)
     }
 
-    /// Writes a file and returns its path.
-    pub fn write(&self, name: &str, text: &str) -> PathBuf {
-        let path = self.at(name);
-        fs::write(&path, text).unwrap();
-        path
-    }
-
     /// The program with the words of `line`, here.
     pub fn program(&self, line: &str) -> Command {
         let mut program = Command::cargo_bin("coadapt").unwrap();
