@@ -178,7 +178,11 @@ impl Session {
             company.manner(),
             &sidecar,
         )
-        .map_err(|error| RunError::Failed(error.to_string()))?;
+        .map_err(|error| {
+            // Nothing was begun: the folder, made a moment ago, holds headers at most.
+            let _ = std::fs::remove_dir_all(&folder);
+            RunError::Failed(error.to_string())
+        })?;
         let learner = policy.map_or_else(|| fresh.clone(), |policy| policy.learner);
         let parts = Parts { profile, sidecar, folder, plan, fresh, hand, recorder };
         let notices = created.notice.into_iter().chain(cut_off).collect();

@@ -25,6 +25,15 @@ pub enum SimulateError {
         /// A good one.
         example: String,
     },
+    /// The table of actions is larger than any that is read.
+    #[error(
+        "{table} is too large: at most {MOST_BYTES} bytes of a table of actions are read; \
+         simulate in parts"
+    )]
+    TooLarge {
+        /// The table's name.
+        table: String,
+    },
     /// The table of actions has faults.
     #[error("{}", .0.join("\n"))]
     Actions(Vec<String>),
@@ -35,6 +44,8 @@ pub enum SimulateError {
 
 /// The most faults of a table that are told.
 const MOST_FAULTS: usize = 20;
+/// The most that is read of a table, bytes: days of actions.
+const MOST_BYTES: u64 = 64 << 20;
 
 /// Reads `x,…` as a state of the profile's plant.
 ///
@@ -68,8 +79,18 @@ pub fn start(profile: &Profile, given: &str) -> Result<State, SimulateError> {
 /// messages.
 ///
 /// # Errors
-/// With the place of every wrong cell, up to twenty.
+/// With the place of every wrong cell, up to twenty; when the table is too large.
 pub fn actions(name: &str, table: impl Read) -> Result<Vec<f64>, SimulateError> {
+    let mut table = table.take(MOST_BYTES);
+    let read = actions_of(name, &mut table);
+    // A table without end would fill the memory; what was read of it means nothing.
+    if table.limit() == 0 {
+        return Err(SimulateError::TooLarge { table: name.to_owned() });
+    }
+    read
+}
+
+fn actions_of(name: &str, table: impl Read) -> Result<Vec<f64>, SimulateError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(table);
     let told = |error: &csv::Error| format!("{name}: {error}");
     let headers = reader.headers().map_err(|e| SimulateError::Actions(vec![told(&e)]))?.clone();
@@ -175,6 +196,12 @@ mod tests {
         let message = told("u\n1\nNaN\n\"x\"\n");
         assert!(message.contains("line 3") && message.contains("line 4"), "{message}");
         assert!(told("v\n1\n").contains("no column `u`"));
+    }
+
+    #[test]
+    fn a_table_without_end_is_refused() {
+        let message = actions("noise", io::repeat(b'x')).unwrap_err().to_string();
+        assert!(message.contains("noise is too large"), "{message}");
     }
 
     #[test]

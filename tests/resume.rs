@@ -1,0 +1,245 @@
+//! Sessions that were killed, told to end or short of disk, and go on where they stood.
+
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking, helpers too")]
+
+#[path = "program/desk.rs"]
+mod desk;
+
+use std::fs;
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::LazyLock;
+
+use coadapt::clock::{Clock, WallClock};
+use coadapt::signal::Seconds;
+use desk::{Desk, names, text};
+use serde_json::Value;
+
+/// Long enough to be killed in every phase: experts keep the pole up for the full 20 s.
+const LONG: &str = "run balance --headless --operator simulated:expert --seed 5 --json \
+    --rollouts 40 --set session.introduction_rollouts=6 --set session.autonomous_rollouts=10";
+const FOLDER: &str = "logs/anon/001-balance-simultaneous";
+const RESUME: &str = "run --headless --json --resume logs/anon/001-balance-simultaneous";
+
+/// The same session, never cut.
+static UNBROKEN: LazyLock<(Desk, Value)> = LazyLock::new(|| {
+    let desk = Desk::new();
+    let results = serde_json::from_str(&desk.succeed(LONG)).unwrap();
+    (desk, results)
+});
+
+fn unbroken() -> PathBuf {
+    UNBROKEN.0.at(FOLDER)
+}
+
+/// The program at work; killed if a test fails.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Running {
+    /// The long session, as soon as its `steps.csv` holds `bytes`.
+    fn until(desk: &Desk, bytes: u64) -> Self {
+        Self::start(desk, LONG).once("steps.csv", bytes, desk)
+    }
+
+    fn start(desk: &Desk, line: &str) -> Self {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_coadapt"));
+        program.args(line.split_whitespace()).current_dir(desk.at(""));
+        Self(program.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
+    }
+
+    /// The same, as soon as `file` of the session holds `bytes`.
+    fn once(mut self, file: &str, bytes: u64, desk: &Desk) -> Self {
+        let file = desk.at(FOLDER).join(file);
+        let mut clock = WallClock::start();
+        while fs::metadata(&file).map_or(0, |file| file.len()) < bytes {
+            assert_eq!(self.0.try_wait().unwrap(), None, "over before {bytes} bytes");
+            assert!(clock.now() < Seconds(60.0), "no {bytes} bytes in a minute");
+            clock.wait_until(clock.now() + Seconds(0.001));
+        }
+        self
+    }
+
+    fn killed(mut self) {
+        self.0.kill().unwrap();
+        assert_eq!(self.0.wait().unwrap().signal(), Some(9), "over before it was killed");
+    }
+
+    fn signalled(mut self, signal: &str) -> ExitStatus {
+        let line = format!("kill -{signal} {}", self.0.id());
+        assert!(Command::new("sh").args(["-c", &line]).status().unwrap().success());
+        self.0.wait().unwrap()
+    }
+}
+
+/// The part of the unbroken session's rows at which one may be cut.
+fn bytes(part: f64) -> u64 {
+    let all = fs::metadata(unbroken().join("steps.csv")).unwrap().len();
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        reason = "a file's size"
+    )]
+    let bytes = (all as f64 * part) as u64;
+    bytes
+}
+
+fn assert_whole_rows(folder: &Path) {
+    for (file, columns) in [("steps.csv", 17), ("episodes.csv", 11), ("events.csv", 6)] {
+        let text = fs::read_to_string(folder.join(file)).unwrap();
+        // What comes after the last line's end is the cut row.
+        let whole = &text[..text.rfind('\n').unwrap() + 1];
+        let mut rows = csv::ReaderBuilder::new().has_headers(false).from_reader(whole.as_bytes());
+        for row in rows.records() {
+            assert_eq!(row.unwrap().len(), columns, "{file}");
+        }
+    }
+}
+
+/// Goes on with the session on `desk`, which then is the unbroken one.
+fn assert_goes_on(desk: &Desk) {
+    let mut results: Value = serde_json::from_str(&desk.succeed(RESUME)).unwrap();
+    results["session"] = UNBROKEN.1["session"].clone();
+    assert_eq!(results, UNBROKEN.1);
+    let (folder, expected) = (desk.at(FOLDER), unbroken());
+    assert_eq!(names(&folder), names(&expected));
+    let replaced = ["session.json", "events.csv", "checkpoint.json"];
+    for name in names(&expected).iter().filter(|name| !replaced.contains(&name.as_str())) {
+        let same = fs::read(folder.join(name)).unwrap() == fs::read(expected.join(name)).unwrap();
+        assert!(same, "{name} differs after a resume");
+    }
+    let events = fs::read_to_string(folder.join("events.csv")).unwrap();
+    assert!(events.contains("resume"), "{events}");
+    assert_eq!(status(&folder), "complete");
+}
+
+fn status(folder: &Path) -> String {
+    let text = fs::read_to_string(folder.join("session.json")).unwrap();
+    let session: Value = serde_json::from_str(&text).unwrap();
+    session["status"].as_str().unwrap().to_owned()
+}
+
+fn is_killed_and_goes_on(part: f64) {
+    let desk = Desk::new();
+    Running::until(&desk, bytes(part)).killed();
+    assert_whole_rows(&desk.at(FOLDER));
+    assert_goes_on(&desk);
+}
+
+#[test]
+fn a_session_killed_at_its_beginning_goes_on() {
+    let desk = Desk::new();
+    Running::start(&desk, LONG).once("checkpoint.json", 1, &desk).killed();
+    assert_goes_on(&desk);
+}
+
+#[test]
+fn a_session_killed_in_practice_goes_on() {
+    is_killed_and_goes_on(0.03);
+}
+
+#[test]
+fn a_session_killed_early_in_main_goes_on() {
+    is_killed_and_goes_on(0.2);
+}
+
+#[test]
+fn a_session_killed_late_in_main_goes_on() {
+    is_killed_and_goes_on(0.6);
+}
+
+#[test]
+fn a_session_killed_while_the_robot_is_alone_goes_on() {
+    is_killed_and_goes_on(0.85);
+}
+
+#[test]
+fn a_session_killed_twice_goes_on() {
+    let desk = Desk::new();
+    Running::until(&desk, bytes(0.1)).killed();
+    Running::start(&desk, RESUME).once("steps.csv", bytes(0.4), &desk).killed();
+    assert_goes_on(&desk);
+}
+
+#[test]
+fn rows_cut_at_any_byte_after_the_checkpoint_are_dropped() {
+    let killed = Desk::new();
+    Running::until(&killed, bytes(0.3)).killed();
+    let folder = killed.at(FOLDER);
+    let checkpoint: Value =
+        serde_json::from_slice(&fs::read(folder.join("checkpoint.json")).unwrap()).unwrap();
+    let kept = checkpoint["steps_bytes"].as_u64().unwrap();
+    let written = fs::metadata(folder.join("steps.csv")).unwrap().len();
+    assert!(written >= kept);
+    for length in [kept, kept + 1, kept.midpoint(written), written.max(kept + 1) - 1] {
+        let desk = Desk::new();
+        fs::create_dir_all(desk.at(FOLDER)).unwrap();
+        for name in names(&folder) {
+            fs::copy(folder.join(&name), desk.at(FOLDER).join(&name)).unwrap();
+        }
+        let steps = fs::File::options().write(true).open(desk.at(FOLDER).join("steps.csv"));
+        steps.unwrap().set_len(length).unwrap();
+        assert_goes_on(&desk);
+    }
+}
+
+#[test]
+fn a_signal_ends_a_session_that_says_so_and_goes_on() {
+    for (signal, code) in [("TERM", 143), ("INT", 130), ("HUP", 129)] {
+        let desk = Desk::new();
+        let status_code = Running::until(&desk, bytes(0.2)).signalled(signal);
+        assert_eq!(status_code.code(), Some(code), "SIG{signal}");
+        assert_eq!(status(&desk.at(FOLDER)), "interrupted");
+        assert_whole_rows(&desk.at(FOLDER));
+        let events = fs::read_to_string(desk.at(FOLDER).join("events.csv")).unwrap();
+        assert!(events.contains(&format!("SIG{signal}")), "{events}");
+        assert_goes_on(&desk);
+    }
+}
+
+#[test]
+fn a_session_that_filled_its_disk_goes_on() {
+    let desk = Desk::new();
+    // Ignored, the limit on file sizes is an error of `write`, as a full disk is.
+    let line =
+        format!("trap '' XFSZ; ulimit -f 4000; exec {} {LONG}", env!("CARGO_BIN_EXE_coadapt"));
+    let full = Command::new("sh").args(["-c", &line]).current_dir(desk.at("")).output().unwrap();
+    assert_eq!((full.status.code(), text(&full.stdout)), (Some(1), String::new()));
+    let message = text(&full.stderr);
+    assert!(message.contains("steps.csv") && message.contains("--resume"), "{message}");
+    assert_eq!(status(&desk.at(FOLDER)), "failed");
+    assert_goes_on(&desk);
+}
+
+#[test]
+fn a_complete_session_is_refused_and_left_alone() {
+    let desk = Desk::new();
+    desk.succeed("run balance --headless --operator none --seed 1 --rollouts 2 --phases main");
+    let folder = desk.at(FOLDER);
+    let contents = || -> Vec<Vec<u8>> {
+        names(&folder).iter().map(|name| fs::read(folder.join(name)).unwrap()).collect()
+    };
+    let before = contents();
+    let refused = desk.run(RESUME);
+    assert_eq!((refused.status.code(), text(&refused.stdout)), (Some(2), String::new()));
+    assert!(text(&refused.stderr).contains("complete"), "{}", text(&refused.stderr));
+    assert!(before == contents(), "a refused session was changed");
+}
+
+#[test]
+fn a_session_that_still_runs_is_not_taken_over() {
+    let desk = Desk::new();
+    let running = Running::until(&desk, bytes(0.05));
+    let refused = desk.run(RESUME);
+    assert_eq!((refused.status.code(), text(&refused.stdout)), (Some(2), String::new()));
+    running.killed();
+    assert_goes_on(&desk);
+}
