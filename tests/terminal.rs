@@ -178,6 +178,27 @@ fn a_killed_session_is_offered_and_resumed() {
 }
 
 #[test]
+fn a_resumed_session_keeps_its_keyboard() {
+    let line = format!("{CALM} --set operator.keyboard.tap_hold_s=1");
+    let mut killed = Seat::default().open(&line);
+    killed.shows_that("a checkpoint", |_| killed.at(FOLDER).join("checkpoint.json").exists());
+    killed.signal("KILL");
+    killed.code();
+    let seat = Seat { desk: Some(killed.into_desk()), ..Seat::default() };
+    let mut terminal = seat.open(&format!("run --resume {FOLDER}"));
+    terminal.shows("Enter   begin");
+    terminal.keys("\r");
+    terminal.goes();
+    terminal.keys("\x1b[C");
+    terminal.shows_that("a push to the right", |screen| push(screen).is_some_and(|n| n > 0.0));
+    terminal.shows_that("no push", |screen| push(screen) == Some(0.0));
+    end(&terminal);
+    assert_eq!(terminal.code(), 0);
+    let pushes = terminal.pushes(FOLDER);
+    assert!(pushes.iter().filter(|u| **u > 0.0).count() > 30, "{pushes:?}");
+}
+
+#[test]
 fn no_color_means_no_colour() {
     let seat = Seat { variables: vec![("NO_COLOR", "1")], ..Seat::default() };
     let mut terminal = seat.open(CALM);
