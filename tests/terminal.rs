@@ -8,7 +8,7 @@ mod desk;
 
 use std::fs;
 
-use desk::{Answers, Seat, Terminal};
+use desk::{Answers, Seat, Terminal, rest};
 
 /// A pole that hangs about: nothing falls, so that a rollout lasts as long as the test.
 const CALM: &str = "run balance --seed 1 --set plant.gravity_m_s2=0 --set rules.fail_deg=90 \
@@ -57,7 +57,7 @@ fn arrow_keys_push_for_a_while_where_releases_are_not_reported() {
     let mut terminal = live(Answers::Plainly);
     for _ in 0..25 {
         terminal.keys("\x1b[C");
-        terminal.rest(0.03);
+        rest(0.03);
     }
     terminal.shows_that("the push ended", |screen| push(screen) == Some(0.0));
     terminal.keys("\x1b[D");
@@ -77,7 +77,7 @@ fn a_key_pushes_until_its_reported_release() {
     terminal.shows_that("the question is over", |_| terminal.wrote("\x1b[>"));
     terminal.keys("\x1b[C");
     // Far longer than a tap without releases would push.
-    terminal.rest(1.0);
+    rest(1.0);
     terminal.shows_that("a push to the right", |screen| push(screen) == Some(5.0));
     terminal.keys("\x1b[1;1:3C");
     terminal.shows_that("no push", |screen| push(screen) == Some(0.0));
@@ -263,7 +263,7 @@ fn a_storm_of_sizes_never_disturbs_the_session() {
     let sizes = [(1, 1), (200, 60), (10, 3), (79, 24), (80, 23), (300, 2), (2, 100), (120, 40)];
     for (columns, rows) in sizes.into_iter().cycle().take(80) {
         terminal.resize(columns, rows);
-        terminal.rest(0.005);
+        rest(0.005);
     }
     terminal.resize(80, 24);
     terminal.shows("motor");
