@@ -143,7 +143,7 @@ fn policies_must_be_whole_and_fitting() {
     let file = desk.at("kept/anon/001-balance-simultaneous/policy.json");
     let policy = fs::read_to_string(file).unwrap();
     fs::write(desk.at("half.json"), &policy[..policy.len() / 2]).unwrap();
-    fs::write(desk.at("other.json"), &policy.replace("\"balance\"", "\"swing-up\"")).unwrap();
+    fs::write(desk.at("other.json"), policy.replace("\"balance\"", "\"swing-up\"")).unwrap();
     fs::write(desk.at("empty.json"), "{}").unwrap();
     fs::write(desk.at("words.json"), "nonsense").unwrap();
     let alone = format!("{RUN} --phases autonomous");

@@ -8,7 +8,7 @@ mod desk;
 
 use std::fs;
 
-use desk::{Answers, Seat, Terminal};
+use desk::{Answers, Seat, Terminal, rest};
 
 /// A pole that hangs about: nothing falls, so that a rollout lasts as long as the test.
 const CALM: &str = "run balance --seed 1 --set plant.gravity_m_s2=0 --set rules.fail_deg=90 \
@@ -57,7 +57,7 @@ fn arrow_keys_push_for_a_while_where_releases_are_not_reported() {
     let mut terminal = live(Answers::Plainly);
     for _ in 0..25 {
         terminal.keys("\x1b[C");
-        terminal.rest(0.03);
+        rest(0.03);
     }
     terminal.shows_that("the push ended", |screen| push(screen) == Some(0.0));
     terminal.keys("\x1b[D");
@@ -77,7 +77,7 @@ fn a_key_pushes_until_its_reported_release() {
     terminal.shows_that("the question is over", |_| terminal.wrote("\x1b[>"));
     terminal.keys("\x1b[C");
     // Far longer than a tap without releases would push.
-    terminal.rest(1.0);
+    rest(1.0);
     terminal.shows_that("a push to the right", |screen| push(screen) == Some(5.0));
     terminal.keys("\x1b[1;1:3C");
     terminal.shows_that("no push", |screen| push(screen) == Some(0.0));
@@ -178,6 +178,27 @@ fn a_killed_session_is_offered_and_resumed() {
 }
 
 #[test]
+fn a_resumed_session_keeps_its_keyboard() {
+    let line = format!("{CALM} --set operator.keyboard.tap_hold_s=1");
+    let mut killed = Seat::default().open(&line);
+    killed.shows_that("a checkpoint", |_| killed.at(FOLDER).join("checkpoint.json").exists());
+    killed.signal("KILL");
+    killed.code();
+    let seat = Seat { desk: Some(killed.into_desk()), ..Seat::default() };
+    let mut terminal = seat.open(&format!("run --resume {FOLDER}"));
+    terminal.shows("Enter   begin");
+    terminal.keys("\r");
+    terminal.goes();
+    terminal.keys("\x1b[C");
+    terminal.shows_that("a push to the right", |screen| push(screen).is_some_and(|n| n > 0.0));
+    terminal.shows_that("no push", |screen| push(screen) == Some(0.0));
+    end(&terminal);
+    assert_eq!(terminal.code(), 0);
+    let pushes = terminal.pushes(FOLDER);
+    assert!(pushes.iter().filter(|u| **u > 0.0).count() > 30, "{pushes:?}");
+}
+
+#[test]
 fn no_color_means_no_colour() {
     let seat = Seat { variables: vec![("NO_COLOR", "1")], ..Seat::default() };
     let mut terminal = seat.open(CALM);
@@ -242,7 +263,7 @@ fn a_storm_of_sizes_never_disturbs_the_session() {
     let sizes = [(1, 1), (200, 60), (10, 3), (79, 24), (80, 23), (300, 2), (2, 100), (120, 40)];
     for (columns, rows) in sizes.into_iter().cycle().take(80) {
         terminal.resize(columns, rows);
-        terminal.rest(0.005);
+        rest(0.005);
     }
     terminal.resize(80, 24);
     terminal.shows("motor");

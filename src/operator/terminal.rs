@@ -60,12 +60,15 @@ impl Hands {
     /// Hands that touch no key.
     #[must_use]
     pub fn new(params: &Params) -> Self {
-        let timing = Timing {
-            tap_hold_s: params.tap_hold_s,
-            repeat_hold_s: params.repeat_hold_s,
-            rise_s: params.rise_s,
-        };
-        Self { hold: Arc::new(Mutex::new(Hold::new(timing))) }
+        Self { hold: Arc::new(Mutex::new(Hold::new(timing(params)))) }
+    }
+
+    /// Lets all keys go and from now on keeps the times of `params`.
+    pub fn set_timing(&self, params: &Params) {
+        let mut hold = self.hold();
+        let known = hold.knowledge();
+        *hold = Hold::new(timing(params));
+        hold.set_knowledge(known);
     }
 
     /// Takes a key event if it steers, and says whether it did.
@@ -129,6 +132,14 @@ impl Hands {
     /// The keys' state stays whole even if a thread died holding it.
     fn hold(&self) -> MutexGuard<'_, Hold> {
         self.hold.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn timing(params: &Params) -> Timing {
+    Timing {
+        tap_hold_s: params.tap_hold_s,
+        repeat_hold_s: params.repeat_hold_s,
+        rise_s: params.rise_s,
     }
 }
 

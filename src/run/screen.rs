@@ -108,7 +108,7 @@ struct Stage {
 
 impl Stage {
     fn start(&mut self, order: &Order) -> Result<Running, RunError> {
-        let hands = Hands::new(&super::session::profile_of(order)?.operator.keyboard);
+        let hands = Hands::new(&terminal::Params::default());
         let session = Session::begin(order, self.company(&hands))?;
         self.raise_curtain(session, hands)
     }
@@ -124,6 +124,8 @@ impl Stage {
     }
 
     fn raise_curtain(&mut self, session: Session, hands: Hands) -> Result<Running, RunError> {
+        // Only now is it known whose keyboard it is, for a resumed session as for a new one.
+        hands.set_timing(&session.profile().operator.keyboard);
         self.feed.replace(hands);
         let running = Running {
             info: info(&session),

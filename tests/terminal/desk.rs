@@ -122,6 +122,11 @@ fn read(
     }
 }
 
+/// Lets `time_s` pass.
+pub fn rest(time_s: f64) {
+    WallClock::start().wait_until(Seconds(time_s));
+}
+
 fn contains(bytes: &[u8], part: &[u8]) -> bool {
     bytes.windows(part.len()).any(|window| window == part)
 }
@@ -158,12 +163,6 @@ impl Terminal {
     /// Waits for the countdown.
     pub fn waits(&self) {
         self.shows_that("WAIT", |screen| screen.contains("motor") && screen.contains(" WAIT "));
-    }
-
-    /// Lets `time_s` pass.
-    pub fn rest(&self, time_s: f64) {
-        let mut clock = WallClock::start();
-        clock.wait_until(Seconds(time_s));
     }
 
     pub fn keys(&self, keys: &str) {
