@@ -82,6 +82,13 @@ impl Folder {
         if sidecar.status == Status::Complete {
             return Err(Error::unfit(self.path(), "this session is complete: nothing to resume"));
         }
+        if !self.file(CHECKPOINT).exists() {
+            return Err(Error::unfit(
+                self.path(),
+                "this session was cut before its first rollout: nothing is there to go on \
+                 with, begin a new one",
+            ));
+        }
         let checkpoint: Checkpoint<M> = document::read(&self.file(CHECKPOINT))?;
         let mut steps = Tail::open(self.file(STEPS), checkpoint.steps_bytes)?;
         let mut episodes = Tail::open(self.file(EPISODES), checkpoint.episodes_bytes)?;
