@@ -58,6 +58,17 @@ fn measure<const N: usize>(
     group.finish();
 }
 
+/// A chain of exponentials, each waiting for the one before: what machines are compared by.
+fn calibration(criterion: &mut Criterion) {
+    let mut value = 0.5_f64;
+    criterion.bench_function("calibration, exp", |b| {
+        b.iter(|| {
+            value = (-value).exp();
+            value
+        });
+    });
+}
+
 fn learners(criterion: &mut Criterion) {
     for diag_only in [true, false] {
         let rules = |n, d, init_alpha| Settings {
@@ -78,5 +89,5 @@ fn learners(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, learners);
+criterion_group!(benches, calibration, learners);
 criterion_main!(benches);

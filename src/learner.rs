@@ -2,6 +2,8 @@
 //!
 //! [`Params`] is a profile's section, from which [`Params::build`] makes a [`Model`].
 
+#![expect(clippy::inline_always, reason = "loops of a constant length are unrolled: see `Size`")]
+
 mod kernel;
 mod metric;
 mod params;
@@ -155,4 +157,10 @@ pub enum BuildError {
         /// Its index.
         field: usize,
     },
+}
+
+#[inline(always)]
+fn all_finite(values: &[f64]) -> bool {
+    // Without an early exit the check is cheap: the compiler compares several at a time.
+    values.iter().fold(true, |all, value| all & value.is_finite())
 }

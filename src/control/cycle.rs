@@ -178,16 +178,24 @@ impl<W: Witness> Cycle<W> {
     #[must_use]
     pub fn run(mut self, clock: &mut dyn Clock) -> Outcome<W> {
         let mut pacer = Pacer::new(clock);
-        while !matches!(self.stage, Stage::Finished(_)) {
-            let speed = self.speed();
-            let wake = if speed.is_finite() {
-                pacer.wait(clock, Seconds(self.rules.tick.0 / speed))
-            } else {
-                pacer.skip(clock)
-            };
-            self.tick(wake, clock);
-        }
+        while self.step(clock, &mut pacer) {}
         self.into_outcome()
+    }
+
+    /// Waits for the next tick and does it; false, and nothing is done, once the session
+    /// is finished.
+    pub fn step(&mut self, clock: &mut dyn Clock, pacer: &mut Pacer) -> bool {
+        if matches!(self.stage, Stage::Finished(_)) {
+            return false;
+        }
+        let speed = self.speed();
+        let wake = if speed.is_finite() {
+            pacer.wait(clock, Seconds(self.rules.tick.0 / speed))
+        } else {
+            pacer.skip(clock)
+        };
+        self.tick(wake, clock);
+        true
     }
 
     /// One control tick.

@@ -12,6 +12,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::all_finite;
 use super::kernel::Activation;
 
 /// No step on an entry of M is larger than this share of the largest entry.
@@ -97,19 +98,20 @@ impl Metric {
     }
 
     /// Whether all vectors have `entries` finite numbers.
+    #[inline(always)]
     pub fn is_sound(&self, entries: usize) -> bool {
-        [&self.m, &self.alpha, &self.log_alpha, &self.trace]
-            .iter()
-            .all(|values| values.len() == entries && values.iter().all(|v| v.is_finite()))
+        let sound = |values: &[f64]| values.len() == entries && all_finite(&values[..entries]);
+        sound(&self.m) && sound(&self.alpha) && sound(&self.log_alpha) && sound(&self.trace)
     }
 
-    /// Takes one step from `self` to `next`, and writes its D to `d_next`.
+    /// Takes one step from `self` to `next`, and writes its D to `d_next`. The number of
+    /// inputs n is that of `by`.
+    #[inline(always)]
     pub fn descend(&self, next: &mut Self, d_next: &mut [f64], by: &Descent<'_>, rules: &Rules) {
         let n = by.offset.len();
-        let diagonal = self.m.len() == n;
         let limit = LARGEST_STEP * self.m.iter().fold(0.0, |most: f64, m| most.max(m.abs()));
-        if diagonal {
-            for (a, d) in d_next.iter_mut().enumerate() {
+        if self.m.len() == n {
+            for (a, d) in d_next[..n].iter_mut().enumerate() {
                 let derivatives = self.along_diagonal(a, by, rules.gamma);
                 self.step(next, a, derivatives, by, (limit, rules));
                 bound(&mut next.m[a], true, rules);
@@ -121,7 +123,7 @@ impl Metric {
             let row = &self.m[a * n..][..n];
             let mut reach = 0.0;
             let mut square = 0.0;
-            for (m, offset) in row.iter().zip(by.offset).skip(a) {
+            for (offset, m) in by.offset[a..].iter().zip(&row[a..]) {
                 reach += offset * m;
                 square += m * m;
             }
@@ -134,6 +136,7 @@ impl Metric {
         gram(&next.m, d_next, n);
     }
 
+    #[inline(always)]
     fn along_diagonal(&self, a: usize, by: &Descent<'_>, gamma: f64) -> Derivatives {
         let (m, d, offset) = (self.m[a], by.d[a], by.offset[a]);
         let q = 2.0 * m * offset * offset;
@@ -146,6 +149,7 @@ impl Metric {
     }
 
     /// The derivatives along `M_ab`, given `Σ_{i≥a} d_i M_ai` and `Σ_{i≥a} M_ai²`.
+    #[inline(always)]
     fn along_entry(
         &self,
         (a, b): (usize, usize),
@@ -169,6 +173,7 @@ impl Metric {
         }
     }
 
+    #[inline(always)]
     fn step(
         &self,
         next: &mut Self,
@@ -208,6 +213,7 @@ impl Metric {
 }
 
 /// Keeps an entry of M within the bounds, if there are any.
+#[inline(always)]
 fn bound(m: &mut f64, on_diagonal: bool, rules: &Rules) {
     if let Some((least, most)) = rules.bounds {
         *m = m.clamp(if on_diagonal { least } else { -most }, most);
@@ -215,6 +221,7 @@ fn bound(m: &mut f64, on_diagonal: bool, rules: &Rules) {
 }
 
 /// `D = MᵀM` of an upper triangular M.
+#[inline(always)]
 pub fn gram(m: &[f64], d: &mut [f64], n: usize) {
     for a in 0..n {
         for b in a..n {

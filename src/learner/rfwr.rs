@@ -43,20 +43,19 @@
 
 mod field;
 mod settings;
+mod workshop;
 
 use serde::{Deserialize, Serialize};
 
 pub use field::{Errors, Field, Regression};
 pub use settings::{InitialMetric, MAX_INPUTS, Settings};
 
-use super::kernel::{Activation, Window};
-use super::metric::{Descent, Metric, Rules};
-use super::shapes::{Nearest, Shapes, is_positive};
-use super::{BuildError, Learner, Refusal};
-use field::{Findings, Sample};
+use super::metric::Metric;
+use super::shapes::{Nearest, Shapes, Size, distance};
+use super::{BuildError, Learner, Refusal, all_finite};
+use field::Findings;
+use workshop::Workshop;
 
-/// The bi-square kernel ends at this q.
-const REACH: f64 = 2.0;
 /// A new field takes after the nearest one if that is activated by more than this share of
 /// `w_gen`.
 const KINSHIP: f64 = 0.1;
@@ -83,26 +82,6 @@ struct Stored {
     pruned: u64,
     shapes: Shapes,
     fields: Vec<Field>,
-}
-
-/// What follows from the settings, and room to work in, so that updates need no heap.
-#[derive(Clone, Debug)]
-struct Workshop {
-    window: Window,
-    rules: Rules,
-    /// D of new fields,
-    start_d: Vec<f64>,
-    /// and its factor.
-    start: Metric,
-    /// The state a field is about to have.
-    next: Field,
-    next_d: Vec<f64>,
-    found: Findings,
-    x: Vec<f64>,
-    y: Vec<f64>,
-    offset: Vec<f64>,
-    /// The prediction the update returns.
-    blend: Vec<f64>,
 }
 
 /// What an update did.
@@ -188,30 +167,15 @@ impl Rfwr {
     pub fn learn(&mut self, x: &[f64], y: &[f64], weight: f64) -> Result<Update<'_>, Refusal> {
         self.admit(x, y, weight)?;
         self.samples += 1;
-        let shop = &mut self.workshop;
-        shop.blend.fill(0.0);
-        let mut nearest = Nearest::NONE;
-        let mut voices = 0.0;
-        for (index, field) in self.fields.iter_mut().enumerate() {
-            let q = self.shapes.distance(index, &shop.x);
-            nearest.note(index, q);
-            if !shop.window.may_count(q) {
-                continue;
-            }
-            let w = shop.window.activation(q);
-            if w <= self.settings.cutoff {
-                continue;
-            }
-            let mut place = Place { index, shapes: &mut self.shapes };
-            shop.teach(field, &mut place, shop.window.derivatives(w).times(weight), &self.settings);
-            if field.regression.trustworthy && shop.found.y.iter().all(|y| y.is_finite()) {
-                voices += w;
-                for (sum, y) in shop.blend.iter_mut().zip(&shop.found.y) {
-                    *sum += w * y;
-                }
-            }
-        }
-        settle(&mut shop.blend, voices, &self.settings);
+        let nearest = match (x.len(), y.len()) {
+            (1, 1) => self.teach_with((1, 1), weight),
+            (2, 1) => self.teach_with((2, 1), weight),
+            (3, 1) => self.teach_with((3, 1), weight),
+            (4, 1) => self.teach_with((4, 1), weight),
+            (5, 1) => self.teach_with((5, 1), weight),
+            (6, 1) => self.teach_with((6, 1), weight),
+            size => self.teach_with(size, weight),
+        };
         let strongest = |near: Option<(usize, f64)>| {
             let (index, w) = near.map(|(index, q)| (index, self.workshop.window.activation(q)))?;
             (w > 0.0).then_some((index, w))
@@ -224,6 +188,89 @@ impl Rfwr {
             second_activation: second.map_or(0.0, |(_, w)| w),
             growth,
         })
+    }
+
+    /// [`teach`](Self::teach) for constant numbers of inputs and outputs, which makes all
+    /// sizes in it constant.
+    #[inline(always)]
+    fn teach_with(&mut self, (inputs, outputs): (usize, usize), weight: f64) -> Nearest {
+        if self.settings.diag_only {
+            self.teach(Size { inputs, outputs, entries: inputs }, weight)
+        } else {
+            self.teach(Size { inputs, outputs, entries: inputs * inputs }, weight)
+        }
+    }
+
+    /// Lets every active field learn the sample in the workshop, blends their predictions
+    /// of it, and finds the two nearest fields.
+    #[inline(always)]
+    fn teach(&mut self, size: Size, weight: f64) -> Nearest {
+        let shop = &mut self.workshop;
+        shop.blend.fill(0.0);
+        let mut nearest = Nearest::NONE;
+        let mut voices = 0.0;
+        let mut found = Findings::NONE;
+        for (index, field) in self.fields.iter_mut().enumerate() {
+            let (centre, d) = self.shapes.place(index, size);
+            let q = distance(centre, d, &shop.x[..size.inputs]);
+            nearest.note(index, q);
+            if !shop.window.may_count(q) {
+                continue;
+            }
+            let w = shop.window.activation(q);
+            if w <= self.settings.cutoff {
+                continue;
+            }
+            let activation = shop.window.derivatives(w).times(weight);
+            shop.teach(field, (centre, d), (size, activation, &mut found), &self.settings);
+            let said = &found.y[..size.outputs];
+            if field.regression.trustworthy && all_finite(said) {
+                voices += w;
+                for (sum, y) in shop.blend.iter_mut().zip(said) {
+                    *sum += w * y;
+                }
+            }
+        }
+        settle(&mut shop.blend, voices, &self.settings);
+        nearest
+    }
+
+    /// [`consult`](Self::consult) for constant numbers of inputs and outputs.
+    #[inline(always)]
+    fn consult_with(&self, (inputs, outputs): (usize, usize), x: &[f64], y: &mut [f64]) -> f64 {
+        if self.settings.diag_only {
+            self.consult(Size { inputs, outputs, entries: inputs }, x, y)
+        } else {
+            self.consult(Size { inputs, outputs, entries: inputs * inputs }, x, y)
+        }
+    }
+
+    /// Predicts at the normalised `x`, see [`Learner::predict`].
+    #[inline(always)]
+    fn consult(&self, size: Size, x: &[f64], y: &mut [f64]) -> f64 {
+        let x = &x[..size.inputs];
+        let window = self.workshop.window;
+        let mut nearest = f64::INFINITY;
+        let mut voices = 0.0;
+        for (Field { regression, .. }, (centre, d)) in
+            self.fields.iter().zip(self.shapes.each(size))
+        {
+            let q = distance(centre, d, x);
+            nearest = nearest.min(q);
+            if !window.may_count(q) {
+                continue;
+            }
+            let w = window.activation(q);
+            if w <= self.settings.cutoff || !regression.trustworthy {
+                continue;
+            }
+            voices += w;
+            for (k, sum) in y.iter_mut().enumerate() {
+                *sum += w * regression.predict(size, k, x);
+            }
+        }
+        settle(y, voices, &self.settings);
+        window.activation(nearest)
     }
 
     /// Checks a sample and normalises it into the workshop.
@@ -305,84 +352,6 @@ impl Rfwr {
     }
 }
 
-/// Where a field's centre and metric are.
-struct Place<'a> {
-    index: usize,
-    shapes: &'a mut Shapes,
-}
-
-impl Workshop {
-    fn new(settings: &Settings) -> Result<Self, BuildError> {
-        let (start_d, start_m) = settings.start()?;
-        let (n, m) = (settings.inputs, settings.outputs);
-        let metric = Metric::new(start_m, settings.init_alpha);
-        Ok(Self {
-            window: Window::new(settings.kernel, REACH, settings.cutoff),
-            rules: Rules {
-                gamma: settings.gamma(),
-                meta_rate: settings.meta.then_some(settings.meta_rate),
-                bounds: settings.bounds(),
-            },
-            next_d: start_d.clone(),
-            start_d,
-            start: metric.clone(),
-            next: Field::new(settings, vec![0.0; m], metric),
-            found: Findings::new(n, m),
-            x: vec![0.0; n],
-            y: vec![0.0; m],
-            offset: vec![0.0; n],
-            blend: vec![0.0; m],
-        })
-    }
-
-    /// Lets `field` learn the sample, regression first and then its shape.
-    fn teach(
-        &mut self,
-        field: &mut Field,
-        place: &mut Place<'_>,
-        activation: Activation,
-        settings: &Settings,
-    ) {
-        let (n, m) = (settings.inputs, settings.outputs);
-        let Field { regression, metric, errors } = field;
-        let next = &mut self.next;
-        let sample = Sample { x: &self.x, y: &self.y, activation };
-        if activation.w > 0.0 {
-            regression.learn(&mut next.regression, &sample, &mut self.found, settings);
-        }
-        if activation.w <= 0.0 || !next.regression.is_sound(n, m) {
-            regression.mend(settings.init_p);
-            for (k, y) in self.found.y.iter_mut().enumerate() {
-                *y = regression.predict(k, &self.x);
-            }
-            return;
-        }
-        // From here on `next` holds the regression before the sample.
-        std::mem::swap(regression, &mut next.regression);
-        if !settings.update_d {
-            return;
-        }
-        let steps = (&next.regression, &*regression);
-        let heard = (activation, &self.found);
-        let Some(cost) = errors.learn(&mut next.errors, steps, heard, settings) else { return };
-        let (centre, d) = (place.shapes.centre(place.index), place.shapes.metric(place.index));
-        for ((offset, x), c) in self.offset.iter_mut().zip(&self.x).zip(centre) {
-            *offset = x - c;
-        }
-        let descent = Descent { offset: &self.offset, d, activation, cost };
-        metric.descend(&mut next.metric, &mut self.next_d, &descent, &self.rules);
-        let sound = next.errors.is_sound(n, m)
-            && next.metric.is_sound(d.len())
-            && self.next_d.iter().all(|d| d.is_finite())
-            && is_positive(&self.next_d, n);
-        if sound {
-            std::mem::swap(errors, &mut next.errors);
-            std::mem::swap(metric, &mut next.metric);
-            place.shapes.set_metric(place.index, &self.next_d);
-        }
-    }
-}
-
 impl Learner for Rfwr {
     fn inputs(&self) -> usize {
         self.settings.inputs
@@ -398,33 +367,22 @@ impl Learner for Rfwr {
 
     fn predict(&self, x: &[f64], y: &mut [f64]) -> f64 {
         y.fill(0.0);
-        let Settings { inputs, outputs, cutoff, norm_in, .. } = &self.settings;
-        if x.len() != *inputs || y.len() != *outputs {
+        let Size { inputs, outputs, .. } = self.workshop.size;
+        if x.len() != inputs || y.len() != outputs {
             return 0.0;
         }
         let mut room = [0.0; MAX_INPUTS];
-        let scaled = &mut room[..*inputs];
-        divide(scaled, x, norm_in);
-        let scaled = &*scaled;
-        let window = self.workshop.window;
-        let mut nearest = f64::INFINITY;
-        let mut voices = 0.0;
-        self.shapes.distances(scaled, |index, q| {
-            nearest = nearest.min(q);
-            if !window.may_count(q) {
-                return;
-            }
-            let (w, regression) = (window.activation(q), &self.fields[index].regression);
-            if w <= *cutoff || !regression.trustworthy {
-                return;
-            }
-            voices += w;
-            for (k, sum) in y.iter_mut().enumerate() {
-                *sum += w * regression.predict(k, scaled);
-            }
-        });
-        settle(y, voices, &self.settings);
-        window.activation(nearest)
+        let scaled = &mut room[..inputs];
+        divide(scaled, x, &self.settings.norm_in);
+        match (inputs, outputs) {
+            (1, 1) => self.consult_with((1, 1), scaled, y),
+            (2, 1) => self.consult_with((2, 1), scaled, y),
+            (3, 1) => self.consult_with((3, 1), scaled, y),
+            (4, 1) => self.consult_with((4, 1), scaled, y),
+            (5, 1) => self.consult_with((5, 1), scaled, y),
+            (6, 1) => self.consult_with((6, 1), scaled, y),
+            size => self.consult_with(size, scaled, y),
+        }
     }
 
     fn fields(&self) -> usize {
@@ -438,12 +396,11 @@ impl TryFrom<Stored> for Rfwr {
     fn try_from(stored: Stored) -> Result<Self, BuildError> {
         let Stored { settings, samples, pruned, shapes, fields } = stored;
         let workshop = Workshop::new(&settings)?;
-        let (n, m) = (settings.inputs, settings.outputs);
-        if !shapes.holds(n, settings.diag_only, fields.len()) {
+        if !shapes.holds(settings.inputs, settings.diag_only, fields.len()) {
             return Err(BuildError::Shapes { fields: fields.len() });
         }
-        let entries = shapes.entries();
-        if let Some(field) = fields.iter().position(|field| !field.is_sound(n, m, entries)) {
+        let size = settings.size();
+        if let Some(field) = fields.iter().position(|field| !field.is_sound(size)) {
             return Err(BuildError::Field { field });
         }
         Ok(Self { settings, samples, pruned, shapes, fields, workshop })

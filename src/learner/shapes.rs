@@ -5,6 +5,18 @@
 
 use serde::{Deserialize, Serialize};
 
+/// How many numbers there are of what. Everything that happens once a field and sample
+/// takes this along and is inlined: where it is constant, all loops are unrolled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// n inputs.
+    pub inputs: usize,
+    /// m outputs.
+    pub outputs: usize,
+    /// The numbers of a metric: n when diagonal, n × n otherwise.
+    pub entries: usize,
+}
+
 /// Centres c and distance metrics D of all fields, in normalised coordinates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -76,10 +88,18 @@ impl Shapes {
         &self.metrics[field * self.entries()..][..self.entries()]
     }
 
-    /// Gives `field` the metric D.
-    pub fn set_metric(&mut self, field: usize, d: &[f64]) {
-        let entries = self.entries();
-        self.metrics[field * entries..][..entries].copy_from_slice(d);
+    /// The centre of `field`, and its metric to be changed.
+    #[inline(always)]
+    pub fn place(&mut self, field: usize, size: Size) -> (&[f64], &mut [f64]) {
+        let Size { inputs, entries, .. } = size;
+        let centre = &self.centres[field * inputs..][..inputs];
+        (centre, &mut self.metrics[field * entries..][..entries])
+    }
+
+    /// Every field's centre and metric.
+    #[inline(always)]
+    pub fn each(&self, size: Size) -> impl Iterator<Item = (&[f64], &[f64])> {
+        self.centres.chunks_exact(size.inputs).zip(self.metrics.chunks_exact(size.entries))
     }
 
     /// Appends a field.
@@ -94,70 +114,37 @@ impl Shapes {
         self.centres.drain(field * n..(field + 1) * n);
         self.metrics.drain(field * entries..(field + 1) * entries);
     }
-
-    /// The squared distance q of `x` from `field`, in the field's metric.
-    pub fn distance(&self, field: usize, x: &[f64]) -> f64 {
-        let (centre, metric) = (self.centre(field), self.metric(field));
-        if self.diagonal {
-            diagonal_distance(centre, metric, x)
-        } else {
-            full_distance(centre, metric, x)
-        }
-    }
-
-    /// Hands every field's squared distance from `x` to `visit`, in storage order.
-    pub fn distances(&self, x: &[f64], visit: impl FnMut(usize, f64)) {
-        // The common sizes get loops that the compiler can unroll.
-        match self.inputs {
-            2 => self.distances_of(&x[..2], 2, visit),
-            4 => self.distances_of(&x[..4], 4, visit),
-            n => self.distances_of(x, n, visit),
-        }
-    }
-
-    #[inline(always)]
-    #[expect(clippy::inline_always, reason = "specialises the scan to a constant `n`")]
-    fn distances_of(&self, x: &[f64], n: usize, mut visit: impl FnMut(usize, f64)) {
-        let centres = self.centres.chunks_exact(n);
-        if self.diagonal {
-            for (field, (c, d)) in centres.zip(self.metrics.chunks_exact(n)).enumerate() {
-                visit(field, diagonal_distance(c, d, &x[..n]));
-            }
-        } else {
-            for (field, (c, d)) in centres.zip(self.metrics.chunks_exact(n * n)).enumerate() {
-                visit(field, full_distance(c, d, &x[..n]));
-            }
-        }
-    }
 }
 
 /// Whether every number on the diagonal of the metric `d` is a normal positive one.
+#[inline(always)]
 pub fn is_positive(d: &[f64], inputs: usize) -> bool {
     let stride = if d.len() == inputs { 1 } else { inputs + 1 };
-    d.iter().step_by(stride).all(|&value| value >= f64::MIN_POSITIVE)
-}
-
-#[inline(always)]
-#[expect(clippy::inline_always, reason = "specialises the scan to a constant length")]
-fn diagonal_distance(centre: &[f64], metric: &[f64], x: &[f64]) -> f64 {
-    let mut q = 0.0;
-    for ((c, d), x) in centre.iter().zip(metric).zip(x) {
-        let offset = x - c;
-        q += offset * offset * d;
+    let mut positive = true;
+    for i in 0..inputs {
+        positive &= d[i * stride] >= f64::MIN_POSITIVE;
     }
-    q
+    positive
 }
 
+/// The squared distance q of `x` from `centre` in `metric`, diagonal or full.
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "specialises the scan to a constant length")]
-fn full_distance(centre: &[f64], metric: &[f64], x: &[f64]) -> f64 {
+pub fn distance(centre: &[f64], metric: &[f64], x: &[f64]) -> f64 {
+    let n = x.len();
     let mut q = 0.0;
-    for ((c, row), x_a) in centre.iter().zip(metric.chunks_exact(x.len())).zip(x) {
-        let mut along = 0.0;
-        for ((c_b, d), x_b) in centre.iter().zip(row).zip(x) {
-            along += (x_b - c_b) * d;
+    if metric.len() == n {
+        for i in 0..n {
+            let offset = x[i] - centre[i];
+            q += offset * offset * metric[i];
         }
-        q += along * (x_a - c);
+        return q;
+    }
+    for a in 0..n {
+        let mut along = 0.0;
+        for b in 0..n {
+            along += (x[b] - centre[b]) * metric[a * n + b];
+        }
+        q += along * (x[a] - centre[a]);
     }
     q
 }
@@ -191,10 +178,8 @@ mod tests {
 
     #[test]
     fn diagonal_and_full_metrics_measure_alike() {
-        let (mut diagonal, mut full) = (Shapes::new(2, true), Shapes::new(2, false));
-        diagonal.push(&[1.0, -1.0], &[2.0, 3.0]);
-        full.push(&[1.0, -1.0], &[2.0, 0.0, 0.0, 3.0]);
-        assert_eq!(diagonal.distance(0, &[2.0, 1.0]), 14.0);
-        assert_eq!(full.distance(0, &[2.0, 1.0]), 14.0);
+        let (centre, x) = ([1.0, -1.0], [2.0, 1.0]);
+        assert_eq!(distance(&centre, &[2.0, 3.0], &x), 14.0);
+        assert_eq!(distance(&centre, &[2.0, 0.0, 0.0, 3.0], &x), 14.0);
     }
 }

@@ -5,9 +5,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::settings::Settings;
+use super::settings::{MAX_INPUTS, MAX_OUTPUTS, Settings};
+use crate::learner::all_finite;
 use crate::learner::kernel::Activation;
 use crate::learner::metric::{Cost, Metric};
+use crate::learner::shapes::Size;
 
 /// P beyond this is no knowledge but the outcome of forgetting without new directions.
 const WORN_OUT: f64 = 1e100;
@@ -76,37 +78,34 @@ pub struct Sample<'a> {
     pub activation: Activation,
 }
 
-/// What the regression found about the sample, for the metric: scratch that is overwritten
-/// by each field.
-#[derive(Clone, Debug)]
+/// What the regression found about the sample, for the metric: room on the stack that each
+/// field overwrites, so that the compiler knows it apart from the fields.
+#[derive(Clone, Copy, Debug)]
 pub struct Findings {
     /// x − x̄ (n).
-    pub xz: Vec<f64>,
-    /// y − b₀ (m).
-    pub yz: Vec<f64>,
+    pub xz: [f64; MAX_INPUTS],
     /// P (x − x̄) (n).
-    pub v: Vec<f64>,
+    pub v: [f64; MAX_INPUTS],
+    /// y − b₀ (m).
+    pub yz: [f64; MAX_OUTPUTS],
     /// The error before learning the sample (m).
-    pub e_cv: Vec<f64>,
+    pub e_cv: [f64; MAX_OUTPUTS],
     /// The error after it (m).
-    pub e: Vec<f64>,
+    pub e: [f64; MAX_OUTPUTS],
     /// The field's prediction of the sample (m).
-    pub y: Vec<f64>,
+    pub y: [f64; MAX_OUTPUTS],
 }
 
 impl Findings {
-    /// Room for `inputs` and `outputs`.
-    pub fn new(inputs: usize, outputs: usize) -> Self {
-        let (in_zeros, out_zeros) = (vec![0.0; inputs], vec![0.0; outputs]);
-        Self {
-            xz: in_zeros.clone(),
-            yz: out_zeros.clone(),
-            v: in_zeros,
-            e_cv: out_zeros.clone(),
-            e: out_zeros.clone(),
-            y: out_zeros,
-        }
-    }
+    /// Nothing yet.
+    pub const NONE: Self = Self {
+        xz: [0.0; MAX_INPUTS],
+        v: [0.0; MAX_INPUTS],
+        yz: [0.0; MAX_OUTPUTS],
+        e_cv: [0.0; MAX_OUTPUTS],
+        e: [0.0; MAX_OUTPUTS],
+        y: [0.0; MAX_OUTPUTS],
+    };
 }
 
 impl Field {
@@ -132,20 +131,19 @@ impl Field {
     }
 
     /// Whether all lengths fit and every number is finite.
-    pub fn is_sound(&self, inputs: usize, outputs: usize, entries: usize) -> bool {
-        self.regression.is_sound(inputs, outputs)
-            && self.metric.is_sound(entries)
-            && self.errors.is_sound(inputs, outputs)
+    pub fn is_sound(&self, size: Size) -> bool {
+        self.regression.is_sound(size)
+            && self.metric.is_sound(size.entries)
+            && self.errors.is_sound(size)
     }
 }
 
 impl Regression {
     /// The prediction of output `k` at `x`.
-    #[inline]
-    pub fn predict(&self, k: usize, x: &[f64]) -> f64 {
-        let n = x.len();
-        let slopes = &self.slopes[k * n..][..n];
-        let mean = &self.mean[..n];
+    #[inline(always)]
+    pub fn predict(&self, size: Size, k: usize, x: &[f64]) -> f64 {
+        let n = size.inputs;
+        let (slopes, mean, x) = (&self.slopes[k * n..][..n], &self.mean[..n], &x[..n]);
         let mut y = 0.0;
         for i in 0..n {
             y += slopes[i] * (x[i] - mean[i]);
@@ -154,7 +152,9 @@ impl Regression {
     }
 
     /// Whether all lengths fit, every number is finite and λ is one.
-    pub fn is_sound(&self, inputs: usize, outputs: usize) -> bool {
+    #[inline(always)]
+    pub fn is_sound(&self, size: Size) -> bool {
+        let Size { inputs, outputs, .. } = size;
         self.mean.len() == inputs
             && self.var.len() == inputs
             && self.offset.len() == outputs
@@ -163,15 +163,23 @@ impl Regression {
             && 0.0 < self.lambda
             && self.lambda <= 1.0
             && all_finite(&[self.n_data, self.sum_w])
-            && [&self.mean, &self.var, &self.offset, &self.slopes, &self.p]
-                .into_iter()
-                .all(|values| all_finite(values))
+            && all_finite(&self.mean[..inputs])
+            && all_finite(&self.var[..inputs])
+            && all_finite(&self.offset[..outputs])
+            && all_finite(&self.slopes[..inputs * outputs])
+            && all_finite(&self.p[..inputs * inputs])
     }
 
-    /// The variance inflation factors: how badly the field knows each input direction.
-    fn inflation(&self) -> impl Iterator<Item = f64> {
-        let n = self.mean.len();
-        self.p.iter().step_by(n + 1).zip(&self.var).map(|(p, var)| p * var)
+    /// Whether all variance inflation factors, which tell how badly the field knows each
+    /// input direction, pass the `test`.
+    #[inline(always)]
+    fn inflation(&self, n: usize, test: impl Fn(f64) -> bool) -> bool {
+        let (p, var) = (&self.p[..n * n], &self.var[..n]);
+        let mut all = true;
+        for i in 0..n {
+            all &= test(p[i * (n + 1)] * var[i]);
+        }
+        all
     }
 
     /// Starts P anew if forgetting has blown it up in a direction that is never seen.
@@ -183,157 +191,192 @@ impl Regression {
         }
     }
 
-    /// Learns `sample`, from `self` into `next`, and leaves what it found in `found`.
+    /// Becomes equal to `other`, without moving.
+    #[inline(always)]
+    pub fn copy(&mut self, other: &Self, size: Size) {
+        let Size { inputs: n, outputs: m, .. } = size;
+        self.trustworthy = other.trustworthy;
+        self.n_data = other.n_data;
+        self.lambda = other.lambda;
+        self.sum_w = other.sum_w;
+        self.mean[..n].copy_from_slice(&other.mean[..n]);
+        self.var[..n].copy_from_slice(&other.var[..n]);
+        self.offset[..m].copy_from_slice(&other.offset[..m]);
+        self.slopes[..n * m].copy_from_slice(&other.slopes[..n * m]);
+        self.p[..n * n].copy_from_slice(&other.p[..n * n]);
+    }
+
+    /// Learns `sample`, and leaves what it found in `found`.
+    #[inline(always)]
     pub fn learn(
-        &self,
-        next: &mut Self,
+        &mut self,
         sample: &Sample<'_>,
-        found: &mut Findings,
+        (size, found): (Size, &mut Findings),
         rules: &Settings,
     ) {
         let w = sample.activation.w;
-        self.move_means(next, sample, found);
-        let n = found.xz.len();
-        for (k, e_cv) in found.e_cv.iter_mut().enumerate() {
-            *e_cv = found.yz[k] - dot(&self.slopes[k * n..][..n], &found.xz);
-        }
-        self.shrink_p(next, w, found);
-        for k in 0..found.yz.len() {
-            let slopes = &mut next.slopes[k * n..][..n];
-            for (i, slope) in slopes.iter_mut().enumerate() {
-                *slope = self.slopes[k * n + i] + w * found.v[i] * found.e_cv[k];
-            }
-            let fitted = dot(slopes, &found.xz);
-            found.e[k] = found.yz[k] - fitted;
-            found.y[k] = fitted + next.offset[k];
+        let Size { inputs: n, outputs: m, .. } = size;
+        self.move_means(sample, size, found);
+        let Findings { xz, v, yz, e_cv, e, y } = found;
+        let (xz, v) = (&xz[..n], &mut v[..n]);
+        self.shrink_p(w, xz, v);
+        for k in 0..m {
+            let slopes = &mut self.slopes[k * n..][..n];
+            e_cv[k] = yz[k] - dot(slopes, xz);
+            add(slopes, w * e_cv[k], v);
+            let fitted = dot(slopes, xz);
+            e[k] = yz[k] - fitted;
+            y[k] = fitted + self.offset[k];
         }
         #[expect(clippy::cast_precision_loss, reason = "a few inputs")]
         let enough = rules.min_n_data_factor * n as f64;
-        next.trustworthy = self.trustworthy
-            || self.n_data > enough && next.inflation().all(|vif| vif < rules.vif_trust);
-        next.sum_w = self.lambda * self.sum_w + w;
-        next.n_data = self.lambda * self.n_data + 1.0;
-        next.lambda =
+        self.trustworthy = self.trustworthy
+            || self.n_data > enough && self.inflation(n, |vif| vif < rules.vif_trust);
+        self.n_data = self.lambda * self.n_data + 1.0;
+        self.lambda =
             rules.tau_lambda * self.lambda + rules.final_lambda * (1.0 - rules.tau_lambda);
     }
 
     /// The weighted means and variances with the sample, and the sample relative to them.
-    fn move_means(&self, next: &mut Self, sample: &Sample<'_>, found: &mut Findings) {
+    #[inline(always)]
+    fn move_means(&mut self, sample: &Sample<'_>, size: Size, found: &mut Findings) {
+        let Size { inputs: n, outputs: m, .. } = size;
         let w = sample.activation.w;
-        let total = self.sum_w * self.lambda + w;
-        for (i, x) in sample.x.iter().enumerate() {
-            next.mean[i] = (self.sum_w * self.mean[i] * self.lambda + w * x) / total;
-            let xz = x - next.mean[i];
-            next.var[i] = (self.sum_w * self.var[i] * self.lambda + w * xz * xz) / total;
-            found.xz[i] = xz;
+        let remembered = self.lambda * self.sum_w;
+        self.sum_w = remembered + w;
+        // The shares of the past and of the sample.
+        let (past, now) = (remembered / self.sum_w, w / self.sum_w);
+        let (x, xz) = (&sample.x[..n], &mut found.xz[..n]);
+        let (mean, var) = (&mut self.mean[..n], &mut self.var[..n]);
+        for i in 0..n {
+            mean[i] = past * mean[i] + now * x[i];
+            xz[i] = x[i] - mean[i];
         }
-        for (k, y) in sample.y.iter().enumerate() {
-            next.offset[k] = (self.sum_w * self.offset[k] * self.lambda + w * y) / total;
-            found.yz[k] = y - next.offset[k];
+        for i in 0..n {
+            var[i] = past * var[i] + now * (xz[i] * xz[i]);
+        }
+        let (y, yz, offset) = (&sample.y[..m], &mut found.yz[..m], &mut self.offset[..m]);
+        for k in 0..m {
+            offset[k] = past * offset[k] + now * y[k];
+            yz[k] = y[k] - offset[k];
         }
     }
 
     /// P ← (P − P x xᵀP / (λ/w + xᵀP x)) / λ, and v = P x with the new P.
-    fn shrink_p(&self, next: &mut Self, w: f64, found: &mut Findings) {
-        let n = found.xz.len();
-        let Findings { xz, v, .. } = found;
-        for (v, row) in v.iter_mut().zip(self.p.chunks_exact(n)) {
-            *v = dot(row, xz);
-        }
-        let gain = self.lambda / w + dot(v, xz);
-        for a in 0..n {
-            for b in a..n {
-                let p = (self.p[a * n + b] - v[a] * v[b] / gain) / self.lambda;
-                next.p[a * n + b] = p;
-                next.p[b * n + a] = p;
+    #[inline(always)]
+    fn shrink_p(&mut self, w: f64, xz: &[f64], v: &mut [f64]) {
+        let n = xz.len();
+        let p = &mut self.p[..n * n];
+        multiply(v, p, xz);
+        let gain = 1.0 / (self.lambda / w + dot(v, xz));
+        let growth = 1.0 / self.lambda;
+        for (a, row) in p.chunks_exact_mut(n).enumerate() {
+            for b in 0..n {
+                row[b] = (row[b] - v[a] * v[b] * gain) * growth;
             }
         }
-        for (v, row) in v.iter_mut().zip(next.p.chunks_exact(n)) {
-            *v = dot(row, xz);
-        }
+        multiply(v, p, xz);
     }
 }
 
 impl Errors {
     /// Whether all lengths fit and every number is finite.
-    pub fn is_sound(&self, inputs: usize, outputs: usize) -> bool {
+    #[inline(always)]
+    pub fn is_sound(&self, size: Size) -> bool {
+        let Size { inputs, outputs, .. } = size;
         self.h.len() == inputs * outputs
             && self.r.len() == inputs * inputs
             && all_finite(&[self.sum_e_cv2, self.sum_e2])
-            && all_finite(&self.h)
-            && all_finite(&self.r)
+            && all_finite(&self.h[..inputs * outputs])
+            && all_finite(&self.r[..inputs * inputs])
     }
 
-    /// Learns from what the regression found, from `self` into `next`, and says how the
-    /// field's shape should change; `None` while too little is known in every direction.
+    /// Becomes equal to `other`, without moving.
+    #[inline(always)]
+    pub fn copy(&mut self, other: &Self, size: Size) {
+        let Size { inputs: n, outputs: m, .. } = size;
+        self.sum_e_cv2 = other.sum_e_cv2;
+        self.sum_e2 = other.sum_e2;
+        self.h[..n * m].copy_from_slice(&other.h[..n * m]);
+        self.r[..n * n].copy_from_slice(&other.r[..n * n]);
+    }
+
+    /// Learns from what the regression found, and says how the field's shape should change;
+    /// `None`, and nothing is learned, while too little is known in every direction.
     ///
-    /// `before` and `after` are the regression without and with the sample.
+    /// `lambda` is the forgetting factor before, `after` the regression with the sample.
+    #[inline(always)]
     pub fn learn(
-        &self,
-        next: &mut Self,
-        (before, after): (&Regression, &Regression),
-        (activation, found): (Activation, &Findings),
+        &mut self,
+        (lambda, after): (f64, &Regression),
+        (activation, size, found): (Activation, Size, &Findings),
         rules: &Settings,
     ) -> Option<Cost> {
-        if after.inflation().all(|vif| vif > rules.vif_update) {
+        let Size { inputs: n, outputs: m, .. } = size;
+        if after.inflation(n, |vif| vif > rules.vif_update) {
             return None;
         }
-        let Findings { xz, v, e_cv, e, .. } = found;
-        let n = xz.len();
-        let (w, lambda, total) = (activation.w, before.lambda, after.sum_w);
+        let (xz, v) = (&found.xz[..n], &found.v[..n]);
+        let (e_cv, e) = (&found.e_cv[..m], &found.e[..m]);
+        let (h, r) = (&mut self.h[..n * m], &mut self.r[..n * n]);
+        let (w, total) = (activation.w, after.sum_w);
         let (e_cv2, e2) = (dot(e_cv, e_cv), dot(e, e));
-        next.sum_e_cv2 = lambda * self.sum_e_cv2 + w * e_cv2;
-        next.sum_e2 = lambda * self.sum_e2 + w * e2;
-        let spread = next.sum_e_cv2;
-        let transient = (next.sum_e2 / (spread + TINY)).powi(4);
-        let h = w * dot(v, xz);
+        self.sum_e_cv2 = lambda * self.sum_e_cv2 + w * e_cv2;
+        self.sum_e2 = lambda * self.sum_e2 + w * e2;
+        let spread = self.sum_e_cv2;
+        let transient = (self.sum_e2 / (spread + TINY)).powi(4);
+        let x_v = dot(xz, v);
 
         // Σ (v eᵀ)∘H, and v R vᵀ.
         let mut through_slopes = 0.0;
-        for (e, h) in e.iter().zip(self.h.chunks_exact(n)) {
-            through_slopes += e * dot(v, h);
+        for k in 0..m {
+            through_slopes += e[k] * dot(v, &h[k * n..][..n]);
         }
         let mut through_p = 0.0;
-        for (v_a, r) in v.iter().zip(self.r.chunks_exact(n)) {
-            through_p += v_a * dot(r, v);
+        for (a, row) in r.chunks_exact(n).enumerate() {
+            through_p += v[a] * dot(row, v);
         }
-        let j1_slope =
-            -spread / (total * total) + (e_cv2 - 2.0 * through_slopes - 2.0 * through_p) / total;
+        let share = 1.0 / total;
+        let mean_spread = spread * share * share;
+        let j1_slope = (e_cv2 - 2.0 * through_slopes - 2.0 * through_p) * share - mean_spread;
         let j1_curvature = if rules.meta {
-            let x_v = dot(xz, v);
             // Σ (−v eᵀ/W − 2 v (xᵀv eᵀ))∘H
-            let bent = -through_slopes / total - 2.0 * x_v * through_slopes;
-            -e_cv2 / (total * total) - 2.0 / total * bent + 2.0 * e2 * h / (total * w)
-                - (e_cv2 - 2.0 * through_slopes) / (total * total)
-                + 2.0 * spread / (total * total * total)
+            let bent = -through_slopes * share - 2.0 * x_v * through_slopes;
+            -e_cv2 * share * share - 2.0 * share * bent + 2.0 * e2 * x_v * share
+                - (e_cv2 - 2.0 * through_slopes) * share * share
+                + 2.0 * mean_spread * share
         } else {
             0.0
         };
 
-        let room = rules.min_one_minus_h.map_or(1.0 - h, |least| (1.0 - h).max(least));
-        for (k, e_cv) in e_cv.iter().enumerate() {
-            let gain = w / room * transient * e_cv;
-            for (i, xz) in xz.iter().enumerate() {
-                next.h[k * n + i] = lambda * self.h[k * n + i] + gain * xz;
+        let room = 1.0 - w * x_v;
+        let room = rules.min_one_minus_h.map_or(room, |least| room.max(least));
+        let credit = w / room * transient;
+        for k in 0..m {
+            let gain = credit * e_cv[k];
+            for (i, h) in h[k * n..][..n].iter_mut().enumerate() {
+                *h = lambda * *h + gain * xz[i];
             }
         }
-        let gain = w * w * e_cv2 / room * transient;
-        for a in 0..n {
+        let gain = w * e_cv2 * credit;
+        for (a, row) in r.chunks_exact_mut(n).enumerate() {
+            let gain = gain * xz[a];
             for b in 0..n {
-                next.r[a * n + b] = lambda * self.r[a * n + b] + gain * xz[a] * xz[b];
+                row[b] = lambda * row[b] + gain * xz[b];
             }
         }
         #[expect(clippy::cast_precision_loss, reason = "a few outputs")]
-        let outputs = e_cv.len() as f64;
+        let outputs = m as f64;
         Some(Cost {
             j1_slope: j1_slope / outputs,
             j1_curvature: j1_curvature / outputs,
-            share: w / total,
+            share: w * share,
             transient,
         })
     }
 }
 
+#[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sum = 0.0;
     for (a, b) in a.iter().zip(b) {
@@ -342,7 +385,19 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     sum
 }
 
-fn all_finite(values: &[f64]) -> bool {
-    // Without an early exit the check is cheap: the compiler compares several at a time.
-    values.iter().fold(true, |all, value| all & value.is_finite())
+/// A symmetric matrix times `x`: column by column, so that all sums grow side by side.
+#[inline(always)]
+fn multiply(into: &mut [f64], symmetric: &[f64], x: &[f64]) {
+    into.fill(0.0);
+    for (column, &x) in symmetric.chunks_exact(x.len()).zip(x) {
+        add(into, x, column);
+    }
+}
+
+/// Adds `factor` times `values`.
+#[inline(always)]
+fn add(to: &mut [f64], factor: f64, values: &[f64]) {
+    for (to, value) in to.iter_mut().zip(values) {
+        *to += factor * value;
+    }
 }

@@ -5,10 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::learner::BuildError;
 use crate::learner::kernel::Kernel;
-use crate::learner::shapes::is_positive;
+use crate::learner::shapes::{Size, is_positive};
 
 /// The most inputs a learner takes.
 pub const MAX_INPUTS: usize = 64;
+/// The most outputs.
+pub const MAX_OUTPUTS: usize = 64;
 
 /// The metric that new fields start with, in normalised coordinates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -124,6 +126,12 @@ impl Settings {
             d_ceiling: None,
             min_one_minus_h: None,
         }
+    }
+
+    /// The sizes of everything.
+    pub(super) fn size(&self) -> Size {
+        let entries = if self.diag_only { self.inputs } else { self.inputs * self.inputs };
+        Size { inputs: self.inputs, outputs: self.outputs, entries }
     }
 
     /// γ, the penalty per input.
