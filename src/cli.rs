@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use crate::profile::Order;
-use crate::session::Subject;
+use crate::session::BadSubject;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -51,9 +51,9 @@ pub struct Run {
     pub profile: Option<String>,
     /// Who: 1 to 64 letters, digits, '-' and '_' [default: anon].
     #[arg(long, value_name = "ID")]
-    pub subject: Option<Subject>,
+    pub subject: Option<String>,
     /// The trial's number [default: the next free one].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub trial: Option<u32>,
     /// simultaneous, sequential or assigned.
     #[arg(long, value_name = "MODE")]
@@ -81,7 +81,8 @@ pub struct Run {
     pub policy: Option<String>,
     /// Go on with a session that was cut.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["profile", "subject", "trial", "mode",
-        "learner", "phases", "rollouts", "duration", "policy", "seed", "set"])]
+        "learner", "operator", "backend", "phases", "rollouts", "duration", "policy", "seed", "set",
+        "logs"])]
     pub resume: Option<PathBuf>,
     /// The seed of everything left to chance [default: drawn and stored].
     #[arg(long, value_name = "N")]
@@ -170,11 +171,13 @@ fn key_value(text: &str) -> Result<(String, String), String> {
 
 impl Run {
     /// The session that these words ask for.
-    #[must_use]
-    pub fn order(&self) -> Order {
+    ///
+    /// # Errors
+    /// When the subject cannot name a folder.
+    pub fn order(&self) -> Result<Order, BadSubject> {
         let mut order = Order {
             profile: self.profile.clone().unwrap_or_default(),
-            subject: self.subject.clone().unwrap_or_default(),
+            subject: self.subject.as_deref().map(str::parse).transpose()?.unwrap_or_default(),
             trial: self.trial,
             operator: self.operator.clone(),
             policy: self.policy.clone(),
@@ -186,7 +189,8 @@ impl Run {
         for (key, value) in &self.set {
             order.change(key, value);
         }
-        if self.duration.is_some() && self.rollouts.is_none() {
+        let lasts = self.duration.as_deref().and_then(|d| d.parse::<f64>().ok());
+        if lasts.is_some_and(f64::is_finite) && self.rollouts.is_none() {
             order.change("session.main_rollouts", "None");
         }
         let phases = self.phases.as_ref().map(|phases| format!("[{phases}]"));
@@ -201,6 +205,6 @@ impl Run {
                 order.change(key, value);
             }
         }
-        order
+        Ok(order)
     }
 }

@@ -118,9 +118,7 @@ impl Pacer {
 /// The date and time of the wall, to the millisecond, in UTC (RFC 3339).
 #[must_use]
 pub fn timestamp() -> String {
-    jiff::Timestamp::now()
-        .round(jiff::Unit::Millisecond)
-        .map_or_else(|_| String::new(), |now| now.to_string())
+    jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%S%.3fZ").to_string()
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The composition root: the one room that knows every other.
 
+mod choose;
 pub mod outcome;
 mod screen;
 pub mod session;
@@ -67,9 +68,11 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
 
 /// A whole session on virtual time.
 fn headless(run: &crate::cli::Run) -> Result<ExitCode, RunError> {
-    let session = match &run.resume {
-        Some(folder) => Session::resume(folder, Company::Headless)?,
-        None => Session::begin(&run.order(), Company::Headless)?,
+    let session = if let Some(folder) = &run.resume {
+        Session::resume(folder, Company::Headless)?
+    } else {
+        let order = run.order().map_err(|error| RunError::Usage(error.to_string()))?;
+        Session::begin(&order, Company::Headless)?
     };
     for notice in &session.notices {
         tell(notice);
@@ -109,11 +112,14 @@ fn exit_code(finished: &Finished) -> ExitCode {
     use crate::record::Status;
     match (finished.results.status, finished.signal) {
         (Status::Failed, _) => ExitCode::from(1),
-        (_, Some(signal)) => {
-            ExitCode::from(128_u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
-        }
+        (_, Some(signal)) => signal_code(signal),
         _ => ExitCode::SUCCESS,
     }
+}
+
+/// The exit code of a program that signal `signal` ended.
+fn signal_code(signal: i32) -> ExitCode {
+    ExitCode::from(128_u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
 }
 
 /// A message for a person, on standard error.

@@ -90,7 +90,9 @@ impl Moment {
             Phase::Main => 2,
             Phase::Autonomous | Phase::ZeroControl => 3,
         };
-        Place { phase, rollout: self.rollout, attempt: self.attempt }
+        // A repeated rollout has the same chance again where nobody steers.
+        let attempt = if self.phase.is_steered() { self.attempt } else { 0 };
+        Place { phase, rollout: self.rollout, attempt }
     }
 }
 

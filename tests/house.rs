@@ -204,8 +204,8 @@ fn files_are_short_and_none_is_called_mod() {
 
 /// Words that only some places may use.
 const RESERVED: [(&str, &[&str]); 6] = [
-    ("ratatui::", &["tui", "run"]),
-    ("crossterm::", &["tui", "operator/terminal", "run"]),
+    ("ratatui::", &["tui"]),
+    ("crossterm::", &["tui", "operator/terminal"]),
     ("gilrs::", &["operator/gamepad"]),
     ("serialport::", &["backend/serial", "backend/emulator"]),
     ("Instant::now", &["clock"]),

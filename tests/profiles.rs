@@ -214,9 +214,12 @@ fn saving_never_replaces_a_file_unasked() {
     assert!(std::fs::read_to_string(&path).unwrap().contains("cap_s: 5.0"));
     document.save(&path, true).unwrap();
     assert!(std::fs::read_to_string(&path).unwrap().contains("cap_s: 6.0"));
-    let nowhere = folder.path().join("none/new.ron");
+    let nowhere = path.join("new.ron");
     assert!(matches!(document.save(&nowhere, true), Err(ProfileError::Unwritable { .. })));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    let first = folder.path().join("profiles/first.ron");
+    document.save(&first, false).unwrap();
+    assert!(first.is_file(), "the folder of profiles is made with its first file");
 }
 
 #[test]

@@ -63,6 +63,11 @@ impl Safe {
         Self { inner, limits, tripped: None }
     }
 
+    /// A person began anew after a stop: a latched trip is forgotten.
+    pub const fn clear(&mut self) {
+        self.tripped = None;
+    }
+
     /// Why the plant is stopped, if it is.
     #[must_use]
     pub const fn tripped(&self) -> Option<Trip> {
@@ -95,9 +100,7 @@ impl Backend for Safe {
         self.inner.halt();
     }
 
-    /// A person began a rollout: a latched trip is cleared.
     fn prepare(&mut self, start: State, place: Place) {
-        self.tripped = None;
         self.inner.prepare(start, place);
     }
 }
@@ -150,8 +153,10 @@ mod tests {
         safe.actuate(Action(1.0));
         assert_eq!(safe.tripped(), Some(Trip::Action));
         safe.prepare(State::default(), Place::default());
+        safe.actuate(Action(2.0));
+        safe.clear();
         safe.actuate(Action(-1.0));
-        assert_eq!(*received.lock().unwrap(), [10.0, 0.0, 0.0, -1.0]);
+        assert_eq!(*received.lock().unwrap(), [10.0, 0.0, 0.0, 0.0, -1.0]);
         drop(safe);
         assert!(*halts.lock().unwrap() >= 3);
     }

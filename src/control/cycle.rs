@@ -60,6 +60,8 @@ pub struct Outcome<W> {
     pub finish: Finish,
     /// Why it was ended early.
     pub cause: Option<String>,
+    /// Whether a signal, or the key that stands for one, ended it.
+    pub interrupted: bool,
     /// The learner at its end.
     pub learner: Model,
     /// Windows, shares and gates at its end.
@@ -85,6 +87,8 @@ pub(super) struct Mind {
     pub(super) sharing: Sharing,
     pub(super) learned: u64,
     pub(super) refused: u64,
+    /// Tenths of main whose policies are stored.
+    pub(super) tenths: u8,
 }
 
 /// The rollout under way.
@@ -104,9 +108,11 @@ pub struct Cycle<W> {
     pub(super) before_rollout: Option<Mind>,
     pub(super) rollout: Rollout,
     pub(super) practice: u32,
-    pub(super) tenths: u8,
     pub(super) episodes: Vec<EpisodeRow>,
     pub(super) cause: Option<String>,
+    interrupted: bool,
+    /// Step rows lost before this rollout.
+    pub(super) lost_before: u64,
     pub(super) seen: Snapshot,
     wanted_speed: f64,
     lateness_us: Option<Histogram<u64>>,
@@ -123,7 +129,7 @@ impl<W: Witness> Cycle<W> {
         from: Option<(Standing, Vec<EpisodeRow>)>,
     ) -> Self {
         let sharing = Sharing::new(&rules.sharing, rules.mode, crew.task.regions());
-        let mind = Mind { learner, sharing, learned: 0, refused: 0 };
+        let mind = Mind { learner, sharing, learned: 0, refused: 0, tenths: 0 };
         let moment = from.as_ref().map(|(standing, _)| standing.moment);
         let (stage, effects) = machine::begin(&rules.plan, moment);
         let mut cycle = Self {
@@ -134,9 +140,10 @@ impl<W: Witness> Cycle<W> {
             before_rollout: None,
             rollout: Rollout::default(),
             practice: 0,
-            tenths: 0,
             episodes: Vec::new(),
             cause: None,
+            interrupted: false,
+            lost_before: 0,
             seen: Snapshot::before(stage),
             wanted_speed: 1.0,
             lateness_us: Histogram::new_with_max(60_000_000, 3).ok(),
@@ -151,6 +158,7 @@ impl<W: Witness> Cycle<W> {
             cycle.store_given_policy();
             cycle.store_standing();
         }
+        cycle.publish();
         cycle
     }
 
@@ -162,7 +170,7 @@ impl<W: Witness> Cycle<W> {
         self.mind.learned = standing.learned;
         self.mind.refused = standing.refused;
         self.practice = standing.practice;
-        self.tenths = standing.tenths;
+        self.mind.tenths = standing.tenths;
     }
 
     fn show_earlier(&mut self, earlier: Vec<EpisodeRow>) {
@@ -189,6 +197,8 @@ impl<W: Witness> Cycle<W> {
             return false;
         }
         let speed = self.speed();
+        let is_paced = clock.is_wall() && speed.is_finite();
+        self.crew.witness.allow_waiting(!is_paced);
         let wake = if speed.is_finite() {
             pacer.wait(clock, Seconds(self.rules.tick.0 / speed))
         } else {
@@ -211,6 +221,7 @@ impl<W: Witness> Cycle<W> {
             _ => None,
         };
         self.happen(Event::Tick(end));
+        self.heed_trip();
         self.publish();
     }
 
@@ -355,6 +366,11 @@ impl<W: Witness> Cycle<W> {
                     self.cause.get_or_insert(cause);
                     Event::Abort
                 }
+                Command::Interrupt(cause) => {
+                    self.interrupted = true;
+                    self.cause.get_or_insert(cause);
+                    Event::Abort
+                }
                 Command::Speed(speed) => {
                     self.wanted_speed = if speed > 0.0 { speed } else { 1.0 };
                     continue;
@@ -427,6 +443,7 @@ impl<W: Witness> Cycle<W> {
         Outcome {
             finish,
             cause: self.cause,
+            interrupted: self.interrupted,
             learner: self.mind.learner,
             sharing: self.mind.sharing,
             episodes: self.episodes,

@@ -17,13 +17,19 @@ impl<W: Witness> Cycle<W> {
         let before = self.stage;
         let (stage, effects) = machine::transition(&self.rules.plan, before, event);
         self.stage = stage;
+        // The plant stops before anything that could wait for a disk.
+        if effects.contains(&Effect::Halt) {
+            self.crew.backend.halt();
+        }
+        if matches!((before, event), (Stage::Stopped(_), Event::Begin)) {
+            self.crew.backend.clear();
+        }
         self.note_event(before, event);
         self.carry_out(&effects);
         if let Stage::Running(moment) = self.stage
             && event == Event::Tick(None)
         {
             self.store_tenths(moment, moment.rollout - 1);
-            self.heed_trip();
         }
         let closed = effects
             .iter()
@@ -38,10 +44,10 @@ impl<W: Witness> Cycle<W> {
     pub(super) fn carry_out(&mut self, effects: &[Effect]) {
         for effect in effects {
             match *effect {
-                Effect::Halt => self.crew.backend.halt(),
                 Effect::Enter(phase) => self.enter(phase),
                 Effect::Prepare(moment) => self.prepare(moment),
-                Effect::Release(_) => {}
+                // Halts are done already, before everything else.
+                Effect::Halt | Effect::Release(_) => {}
                 Effect::Close { moment, end } => self.close(moment, end),
                 Effect::Restore => {
                     if let Some(mind) = self.before_rollout.take() {
@@ -68,8 +74,8 @@ impl<W: Witness> Cycle<W> {
                 ),
                 learned: 0,
                 refused: 0,
+                tenths: 0,
             };
-            self.tenths = 0;
         }
         self.note("phase", None, Some(phase), String::new());
     }
@@ -109,6 +115,7 @@ impl<W: Witness> Cycle<W> {
             t,
             state,
         ));
+        self.mark_losses(moment);
         let row = self.episode_row(moment, end);
         self.crew.witness.episode(&row);
         if let Some(publisher) = &self.crew.publisher {
@@ -122,6 +129,17 @@ impl<W: Witness> Cycle<W> {
             self.practice += 1;
         }
         self.store_tenths(moment, moment.rollout);
+    }
+
+    /// Marks a rollout of which step rows were lost.
+    fn mark_losses(&mut self, moment: Moment) {
+        let lost = self.crew.witness.lost();
+        if lost > self.lost_before {
+            let cause =
+                format!("{} step rows could not be written in time", lost - self.lost_before);
+            self.note("rows_lost", Some(moment), None, cause);
+        }
+        self.lost_before = lost;
     }
 
     fn episode_row(&self, moment: Moment, end: End) -> EpisodeRow {
@@ -157,9 +175,9 @@ impl<W: Witness> Cycle<W> {
         }
         let steps = moment.steps_before + u64::from(moment.step);
         let over = self.rules.plan.tenths(Phase::Main, rollouts, steps);
-        while self.tenths < over {
-            self.tenths += 1;
-            self.crew.witness.policy(Some(self.tenths * 10), &self.mind.learner);
+        while self.mind.tenths < over {
+            self.mind.tenths += 1;
+            self.crew.witness.policy(Some(self.mind.tenths * 10), &self.mind.learner);
         }
     }
 
@@ -183,12 +201,15 @@ impl<W: Witness> Cycle<W> {
             learned: self.mind.learned,
             refused: self.mind.refused,
             practice: self.practice,
-            tenths: self.tenths,
+            tenths: self.mind.tenths,
         });
     }
 
     /// A tripped limit is an emergency stop that nobody had to press.
-    fn heed_trip(&mut self) {
+    pub(super) fn heed_trip(&mut self) {
+        if matches!(self.stage, Stage::Stopped(_) | Stage::Finished(_)) {
+            return;
+        }
         if let Some(trip) = self.crew.backend.tripped() {
             self.note("tripped", self.stage.moment(), None, trip.to_string());
             self.happen(Event::Stop);

@@ -2,9 +2,10 @@
 
 use super::witness::{Happening, Standing, Witness};
 use crate::learner::Model;
+use crate::operator::terminal::Hands;
 use crate::record::checkpoint::Checkpoint;
 use crate::record::policy::Policy;
-use crate::record::{EpisodeRow, EventRow, Recorder, StepRow};
+use crate::record::{EpisodeRow, EventRow, Recorder, Sidecar, StepRow};
 use crate::session::Phase;
 use crate::session::plan::Plan;
 use crate::sharing::Mode;
@@ -32,6 +33,8 @@ pub struct Scribe {
     plan: Plan,
     /// The learners after the tenths of main, by percent.
     tenths: Vec<(u8, Model)>,
+    /// The facts of a session at the keyboard, and the hands that know of releases.
+    keyboard: Option<(Sidecar, Hands)>,
     /// Stamps happenings with the wall's time, in sessions on the wall's time.
     stamp: fn() -> String,
 }
@@ -47,7 +50,21 @@ impl Scribe {
         tenths: Vec<(u8, Model)>,
         stamp: fn() -> String,
     ) -> Self {
-        Self { recorder, origin, plan, tenths, stamp }
+        Self { recorder, origin, plan, tenths, keyboard: None, stamp }
+    }
+
+    /// From now on `session.json` says how key releases are known, as soon as they are.
+    pub fn note_key_releases(&mut self, sidecar: Sidecar, hands: Hands) {
+        self.keyboard = Some((sidecar, hands));
+    }
+
+    fn renew_sidecar(&mut self) {
+        let Some((sidecar, hands)) = &mut self.keyboard else { return };
+        let known = hands.knowledge().words();
+        if sidecar.key_releases.as_deref() != Some(known) {
+            sidecar.key_releases = Some(known.to_owned());
+            self.recorder.sidecar(Box::new(sidecar.clone()));
+        }
     }
 
     /// The recorder, for what comes after the last tick, and the learners after the tenths
@@ -59,6 +76,10 @@ impl Scribe {
 }
 
 impl Witness for Scribe {
+    fn allow_waiting(&mut self, may_wait: bool) {
+        self.recorder.allow_waiting(may_wait);
+    }
+
     fn step(&mut self, row: &StepRow) {
         self.recorder.step(*row);
     }
@@ -80,6 +101,7 @@ impl Witness for Scribe {
     }
 
     fn standing(&mut self, standing: Standing) {
+        self.renew_sidecar();
         let Standing { moment, learner, sharing, learned, refused, practice, tenths } = standing;
         self.recorder.checkpoint(Box::new(Checkpoint {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -98,6 +120,8 @@ impl Witness for Scribe {
 
     fn policy(&mut self, percent: Option<u8>, learner: &Model) {
         if let Some(percent) = percent {
+            // A repeated rollout may reach a tenth once more.
+            self.tenths.retain(|(stored, _)| *stored != percent);
             self.tenths.push((percent, learner.clone()));
         }
         let Origin { task, preset, mode, features, action_limit } = self.origin.clone();

@@ -95,6 +95,8 @@ pub enum Command {
     Stop,
     /// End the session, for this reason.
     Abort(String),
+    /// The same, because a signal asked for it or the key that stands for one.
+    Interrupt(String),
     /// Run this many times faster than the wall wherever nobody steers.
     Speed(f64),
 }
@@ -147,6 +149,12 @@ impl Watcher {
         if let Some(new) = rollouts.get(known.len()..) {
             known.extend_from_slice(new);
         }
+    }
+
+    /// Asks for something that must not be passed over; waits while the queue is full.
+    /// False when the control thread is gone.
+    pub fn insist(&self, command: Command) -> bool {
+        self.commands.send(command).is_ok()
     }
 
     /// Asks for something. False when the control thread is gone or drowned in requests.

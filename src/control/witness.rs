@@ -39,6 +39,9 @@ pub struct Happening {
 
 /// Writes down what the cycle does. Nothing here may block a live tick.
 pub trait Witness: Send {
+    /// Whether a full queue may hold up the cycle from now on: not while it keeps pace with
+    /// a person or a device.
+    fn allow_waiting(&mut self, may_wait: bool);
     /// A control step.
     fn step(&mut self, row: &StepRow);
     /// A rollout.
@@ -60,6 +63,7 @@ pub trait Witness: Send {
 pub struct Nobody;
 
 impl Witness for Nobody {
+    fn allow_waiting(&mut self, _may_wait: bool) {}
     fn step(&mut self, _row: &StepRow) {}
     fn episode(&mut self, _row: &EpisodeRow) {}
     fn happening(&mut self, _happening: Happening) {}

@@ -97,7 +97,7 @@ impl Hands {
         self.hold().release(direction, now);
     }
 
-    /// Lets all keys go: the focus is lost, or the session pauses.
+    /// Lets all keys go, since the focus is lost or a new session begins.
     pub fn release_all(&self) {
         self.hold().release_all();
     }

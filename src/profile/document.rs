@@ -196,6 +196,7 @@ impl Document {
             _ => PathBuf::from("."),
         };
         let refused = |error| ProfileError::Unwritable { path: path.to_owned(), error };
+        std::fs::create_dir_all(&folder).map_err(refused)?;
         let mut file =
             tempfile::Builder::new().prefix(".profile-").tempfile_in(&folder).map_err(refused)?;
         file.write_all(self.text().as_bytes()).map_err(refused)?;

@@ -7,7 +7,7 @@ use std::fmt;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 
@@ -54,8 +54,8 @@ pub struct Recorder<M> {
     queue: Option<SyncSender<Message<M>>>,
     thread: Option<JoinHandle<Result<(), Error>>>,
     fault: Arc<OnceLock<String>>,
-    manner: Manner,
     lost: u64,
+    may_wait: bool,
     path: PathBuf,
 }
 
@@ -100,15 +100,24 @@ impl<M: Storable> Recorder<M> {
             .name("coadapt-writer".to_owned())
             .spawn(move || writer.run(&messages))
             .map_err(Error::io("start the writer thread for", &path))?;
-        Ok(Self { queue: Some(queue), thread: Some(thread), fault, manner, lost: 0, path })
+        let may_wait = manner == Manner::Virtual;
+        Ok(Self { queue: Some(queue), thread: Some(thread), fault, lost: 0, may_wait, path })
     }
 
-    /// Records a control step. Live, it never waits: see [`lost`](Self::lost).
+    /// Says whether the one who feeds may be held up when the queue is full: not while it
+    /// keeps pace with a person or a device.
+    pub const fn allow_waiting(&mut self, may_wait: bool) {
+        self.may_wait = may_wait;
+    }
+
+    /// Records a control step. A row that would have to wait, but may not, is
+    /// [lost](Self::lost).
     pub fn step(&mut self, row: StepRow) {
         let Some(queue) = &self.queue else { return };
-        let kept = match self.manner {
-            Manner::Live => queue.try_send(Message::Step(row)).is_ok(),
-            Manner::Virtual => queue.send(Message::Step(row)).is_ok(),
+        let kept = if self.may_wait {
+            queue.send(Message::Step(row)).is_ok()
+        } else {
+            queue.try_send(Message::Step(row)).is_ok()
         };
         self.lost += u64::from(!kept);
     }
@@ -165,15 +174,22 @@ impl<M: Storable> Recorder<M> {
     /// # Errors
     /// The first thing that went wrong since the start.
     pub fn finish(mut self, last: Sidecar) -> Result<(), Error> {
+        self.may_wait = true;
         self.send(Message::Finish(Box::new(last)));
         self.join()
     }
 
-    /// Only step rows may be lost: all else waits for a place in the queue.
+    /// Only step rows may be lost. A queue without room for anything else, minutes behind,
+    /// is a fault that ends the session.
     fn send(&mut self, message: Message<M>) {
-        if let Some(queue) = &self.queue {
-            // A dead writer is told of by `finish`.
+        let Some(queue) = &self.queue else { return };
+        // A dead writer is told of by `finish`.
+        if self.may_wait {
             let _ = queue.send(message);
+        } else if let Err(TrySendError::Full(_)) = queue.try_send(message) {
+            let _ = self
+                .fault
+                .set(format!("the disk under {} has not kept up for minutes", self.path.display()));
         }
     }
 }
@@ -330,8 +346,8 @@ mod tests {
             queue: Some(queue),
             thread: None,
             fault: Arc::default(),
-            manner: Manner::Live,
             lost: 0,
+            may_wait: false,
             path: PathBuf::new(),
         };
         for step in 0..5 {

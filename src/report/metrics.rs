@@ -206,7 +206,9 @@ impl Measures {
     #[must_use]
     pub fn sentence(&self) -> String {
         let spread = self.sd_balance_s.map_or(String::new(), |sd| format!(" ± {sd:.2}"));
-        format!("{:.2}{spread} s balanced over {} rollouts", self.mean_balance_s, self.episodes)
+        let plural = if self.episodes == 1 { "" } else { "s" };
+        let Self { mean_balance_s, episodes, .. } = self;
+        format!("{mean_balance_s:.2}{spread} s balanced over {episodes} rollout{plural}")
     }
 }
 

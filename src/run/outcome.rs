@@ -86,23 +86,27 @@ pub(super) fn conclude(
     folder: PathBuf,
     outcome: Outcome<Scribe>,
     frames: u64,
-    signal: Option<i32>,
+    signal: impl Fn() -> Option<i32>,
 ) -> Result<Finished, RunError> {
-    let Outcome { finish, cause, sharing, episodes, learned, refused, .. } = outcome;
+    let Outcome { finish, cause, interrupted, sharing, episodes, learned, refused, .. } = outcome;
     let fault = outcome.witness.fault();
     let lost_rows = outcome.witness.lost();
     let (mut recorder, tenths) = outcome.witness.into_parts();
-    let status = match (finish, &fault, signal) {
-        (Finish::Complete, None, _) => Status::Complete,
-        (_, Some(_), _) => Status::Failed,
-        (Finish::Aborted, None, Some(_)) => Status::Interrupted,
-        (Finish::Aborted, None, None) => Status::Aborted,
+    let mut status = match (finish, &fault) {
+        (_, Some(_)) => Status::Failed,
+        (Finish::Complete, None) => Status::Complete,
+        (Finish::Aborted, None) if interrupted => Status::Interrupted,
+        (Finish::Aborted, None) => Status::Aborted,
     };
     let mut means = Vec::new();
-    if finish == Finish::Complete && fault.is_none() && !tenths.is_empty() {
-        let rows = evaluation(profile, &tenths, sidecar.seed, &episodes);
-        means = tenth_means(&tenths, &rows);
-        recorder.evaluation(rows);
+    if status == Status::Complete && !tenths.is_empty() {
+        match evaluation(profile, &tenths, sidecar.seed, &episodes, &signal) {
+            Some(rows) => {
+                means = tenth_means(&tenths, &rows);
+                recorder.evaluation(rows);
+            }
+            None => status = Status::Interrupted,
+        }
     }
     let taught = metrics::rollouts_of(&episodes, Phase::Main).next().is_some();
     let main = taught.then(|| MainEnd {
@@ -144,21 +148,26 @@ pub(super) fn conclude(
             folder.display()
         ))
     })?;
-    Ok(Finished { results, cause, folder, episodes, tenths: means, signal })
+    Ok(Finished { results, cause, folder, episodes, tenths: means, signal: signal() })
 }
 
-/// The autonomous rollouts of each tenth's policy. The last tenth is the final policy,
+/// The autonomous rollouts of each tenth's policy; none when a signal came in between, and
+/// a resumed session evaluates them. The last tenth is the final policy,
 /// whose rollouts the autonomous phase just did, on the same starts and noise.
 fn evaluation(
     profile: &Profile,
     tenths: &[(u8, Model)],
     seed: u64,
     episodes: &[EpisodeRow],
-) -> Vec<EvaluationRow> {
+    signal: &impl Fn() -> Option<i32>,
+) -> Option<Vec<EvaluationRow>> {
     let done: Vec<EpisodeRow> =
         metrics::rollouts_of(episodes, Phase::Autonomous).copied().collect();
     let mut rows = Vec::new();
     for (percent, learner) in tenths {
+        if signal().is_some() {
+            return None;
+        }
         let rollouts = if *percent == 100 && !done.is_empty() {
             done.clone()
         } else {
@@ -175,7 +184,7 @@ fn evaluation(
             mean_reward: row.mean_reward,
         }));
     }
-    rows
+    Some(rows)
 }
 
 fn policy_name(percent: u8) -> String {

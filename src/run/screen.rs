@@ -10,7 +10,9 @@ use std::thread::JoinHandle;
 use super::outcome::Finished;
 use super::session::{Company, Keys, Session};
 use super::shutdown::Shutdown;
-use super::{RunError, exit_code, sentences, tell};
+use super::{RunError, exit_code, sentences, signal_code, tell};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
 use crate::cli;
 use crate::clock::WallClock;
 use crate::operator::terminal::{self, Hands};
@@ -40,23 +42,35 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
         Stage { feed: feed.clone(), shutdown: Shutdown::listen(), running: None, last: None };
     // Everything that could be refused is refused before the screen is taken.
     let start = match run {
-        None => Start::Setup(Box::default()),
+        None => {
+            let order = Order::default();
+            super::session::profile_of(&order)?;
+            Start::Setup(Box::new(order))
+        }
         Some(run) => {
             // Without a terminal no folder is made.
             Screen::check().map_err(|error| RunError::Usage(error.to_string()))?;
             let started = match &run.resume {
                 Some(folder) => stage.take_up(folder)?,
-                None => stage.start(&run.order())?,
+                None => stage
+                    .start(&run.order().map_err(|error| RunError::Usage(error.to_string()))?)?,
             };
             Start::Live(Box::new(started))
         }
     };
     keep_panics_off_the_screen();
-    let mut screen = Screen::take(feed).map_err(|error| RunError::Usage(error.to_string()))?;
+    let mut screen = match Screen::take(feed) {
+        Ok(screen) => screen,
+        Err(error) => {
+            stage.stop();
+            return Err(RunError::Usage(error.to_string()));
+        }
+    };
     let ended = panic::catch_unwind(AssertUnwindSafe(|| app::run(&mut screen, &mut stage, start)));
     // The plant first, then the log, then the terminal, then words.
     stage.stop();
-    drop(screen);
+    // A terminal that is gone lets even its farewell fail.
+    let _ = panic::catch_unwind(AssertUnwindSafe(|| drop(screen)));
     give_back();
     if let Some(words) = LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner).take() {
         tell(&words);
@@ -74,11 +88,9 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
     }
     let signal = stage.shutdown.signal();
     Ok(match (ended, &stage.last) {
-        (End::Interrupted, _) => ExitCode::from(130),
-        (End::Signal, _) if let Some(signal) = signal => {
-            ExitCode::from(128_u8.saturating_add(u8::try_from(signal).unwrap_or(0)))
-        }
-        (End::Lost, _) => ExitCode::from(129),
+        (End::Interrupted, _) => signal_code(SIGINT),
+        (End::Signal, _) => signal_code(signal.unwrap_or(SIGTERM)),
+        (End::Lost, _) => signal_code(SIGHUP),
         (_, Some(finished)) => exit_code(finished),
         (_, None) => ExitCode::SUCCESS,
     })
@@ -91,11 +103,17 @@ fn keep_panics_off_the_screen() {
         if is_taken() {
             let name = std::thread::current().name().unwrap_or("unnamed").to_owned();
             let words = format!("the thread {name} panicked: {info}");
-            *LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner) = Some(words);
+            tell_later(&words);
         } else {
             previous(info);
         }
     }));
+}
+
+/// Keeps words until the terminal was given back.
+fn tell_later(words: &str) {
+    let mut last = LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner);
+    *last = Some(last.take().map_or_else(|| words.to_owned(), |first| format!("{first}\n{words}")));
 }
 
 /// The conductor of the screens.
@@ -110,20 +128,32 @@ impl Stage {
     fn start(&mut self, order: &Order) -> Result<Running, RunError> {
         let hands = Hands::new(&terminal::Params::default());
         let session = Session::begin(order, self.company(&hands))?;
-        self.raise_curtain(session, hands)
+        self.raise_curtain(session, hands, order.clone())
     }
 
     fn take_up(&mut self, folder: &Path) -> Result<Running, RunError> {
         let hands = Hands::new(&terminal::Params::default());
         let session = Session::resume(folder, self.company(&hands))?;
-        self.raise_curtain(session, hands)
+        let sidecar = session.sidecar();
+        let order = Order {
+            subject: sidecar.subject.clone(),
+            operator: sidecar.operator.clone(),
+            logs: folder.ancestors().nth(2).map_or_else(|| "logs".into(), Path::to_owned),
+            ..Order::default()
+        };
+        self.raise_curtain(session, hands, order)
     }
 
     fn company(&self, hands: &Hands) -> Company {
         Company::Attended(Keys { hands: hands.clone(), clock: self.feed.clock })
     }
 
-    fn raise_curtain(&mut self, session: Session, hands: Hands) -> Result<Running, RunError> {
+    fn raise_curtain(
+        &mut self,
+        session: Session,
+        hands: Hands,
+        order: Order,
+    ) -> Result<Running, RunError> {
         // Only now is it known whose keyboard it is, for a resumed session as for a new one.
         hands.set_timing(&session.profile().operator.keyboard);
         self.feed.replace(hands);
@@ -132,6 +162,8 @@ impl Stage {
             watcher: session.watcher.clone(),
             frames: session.frames.clone(),
             screen: session.profile().screen.clone(),
+            // The next session has a number and chance of its own.
+            order: Order { trial: None, seed: None, ..order },
             notice: (!session.notices.is_empty()).then(|| session.notices.join("; ")),
         };
         self.shutdown.abort_on_signal(running.watcher.clone());
@@ -149,10 +181,11 @@ impl Stage {
     /// Ends a session that still runs and waits for its last file.
     fn stop(&mut self) {
         self.shutdown.abort_now("the screen ended");
-        if let Some(control) = self.running.take()
-            && let Ok(Ok(finished)) = control.join()
-        {
-            self.last = Some(finished);
+        match self.running.take().map(JoinHandle::join) {
+            Some(Ok(Ok(finished))) => self.last = Some(finished),
+            Some(Ok(Err(error))) => tell_later(&error.to_string()),
+            Some(Err(_)) => tell_later("the control thread failed; the plant is stopped"),
+            None => {}
         }
     }
 }

@@ -1,5 +1,6 @@
 //! One session, put together from an order or taken up again from its folder.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,29 +8,29 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use serde::Serialize;
 
 use super::RunError;
+use super::choose::{assigned_mode, cut_off_notice, order_policy, steer};
 use super::outcome::{Finished, conclude};
 use crate::clock::{self, Clock, WallClock};
 use crate::control::cycle::{Crew, Cycle, Rules};
 use crate::control::scribe::{Origin, Scribe, standing_of};
 use crate::control::snapshot::{Watcher, channel};
 use crate::control::witness::Standing;
-use crate::learner::{Learner, Model};
-use crate::operator::script::Script;
-use crate::operator::shaping::Shaping;
-use crate::operator::simulated::Simulated;
-use crate::operator::terminal::{Hands, Keyboard};
+use crate::learner::Model;
+use crate::operator::terminal::Hands;
 use crate::operator::{self, Choice, Operator};
-use crate::profile::{Document, Experiment, Order, Profile};
-use crate::random::{Place, Purpose, draw_seed, stream};
+use crate::profile::{Document, Order, Profile};
+use crate::random::draw_seed;
 use crate::record::sidecar::Host;
-use crate::record::{
-    self, EpisodeRow, Folder, Manner, Recorder, Sidecar, Status, assignment, folder, policy,
-};
-use crate::session::machine::{self, Stage};
-use crate::session::plan::{Plan, Wanted};
+use crate::record::{self, EpisodeRow, Folder, Manner, Recorder, Sidecar, Status, policy};
+use crate::session::machine::Stage;
+use crate::session::plan::Plan;
 use crate::session::{Moment, Phase, Trial};
-use crate::sharing::Mode;
 use crate::study::evaluate::simulated_backend;
+
+/// The word of the operator at the keyboard.
+const KEYBOARD: &str = "keyboard";
+/// The largest number that a person may give a trial.
+const MOST_TRIALS: u32 = 999_999;
 
 /// The keyboard as a session needs it: what the terminal's reader feeds, and the clock that
 /// both go by.
@@ -125,6 +126,13 @@ impl Session {
                 RunError::Failed(format!("no seed could be drawn ({error}); give one with --seed"))
             })?,
         };
+        if let Some(trial) = order.trial
+            && !(1..=MOST_TRIALS).contains(&trial)
+        {
+            return Err(RunError::Usage(format!(
+                "--trial {trial}: trials are numbered from 1 to {MOST_TRIALS}"
+            )));
+        }
         let policy = order_policy(order, &profile)?;
         let (mode, assigned) = match (&policy, profile.mode.fixed()) {
             (Some(policy), _) => (policy.mode, false),
@@ -209,13 +217,14 @@ impl Session {
         let frozen = record::read_policy::<Model>(&path.join("policy.json")).ok();
         let resumed =
             folder.resume::<Model>(company.manner(), &(company.stamp())()).map_err(failed)?;
-        let tenths = (1..=resumed.checkpoint.tenths)
+        let tenths: Vec<(u8, Model)> = (1..=resumed.checkpoint.tenths)
             .filter_map(|k| {
                 let file = path.join(policy::file_name(Some(k * 10)));
                 Some((k * 10, record::read_policy::<Model>(&file).ok()?.learner))
             })
             .collect();
         let moment = resumed.checkpoint.moment;
+        let done = resumed.checkpoint.tenths;
         let standing = standing_of(resumed.checkpoint, frozen.map(|policy| policy.learner));
         let Some(standing) = standing else {
             return Err(RunError::Failed(format!(
@@ -224,10 +233,17 @@ impl Session {
                 path.display()
             )));
         };
-        let notice = format!(
+        let mut notice = format!(
             "resumed at {} {}; {} rows of the cut rollout were dropped",
             moment.phase, moment.rollout, resumed.dropped_steps
         );
+        let missing = usize::from(done).saturating_sub(tenths.len());
+        if missing > 0 {
+            let _ = write!(
+                notice,
+                "; {missing} of the tenths' policies are missing and will not be evaluated"
+            );
+        }
         let learner = standing.learner.clone().unwrap_or_else(|| fresh.clone());
         let parts = Parts {
             profile,
@@ -273,11 +289,11 @@ impl Session {
         let outcome = self.cycle.run(clock);
         let key_releases = self.keys.as_ref().map(|k| k.hands.knowledge().words().to_owned());
         let sidecar = Sidecar {
-            key_releases: key_releases.filter(|_| self.sidecar.operator == "keyboard"),
+            key_releases: key_releases.filter(|_| self.sidecar.operator == KEYBOARD),
             ..self.sidecar
         };
         let frames = self.frames.load(Ordering::Relaxed);
-        conclude(&self.profile, sidecar, self.folder, outcome, frames, signal())
+        conclude(&self.profile, sidecar, self.folder, outcome, frames, signal)
     }
 }
 
@@ -311,7 +327,12 @@ impl Parts {
             features: task.feature_names().iter().map(|name| (*name).to_owned()).collect(),
             action_limit: task.action_limit(),
         };
-        let scribe = Scribe::new(recorder, origin, plan.clone(), tenths, company.stamp());
+        let mut scribe = Scribe::new(recorder, origin, plan.clone(), tenths, company.stamp());
+        if let Company::Attended(keys) = &company
+            && sidecar.operator == KEYBOARD
+        {
+            scribe.note_key_releases(sidecar.clone(), keys.hands.clone());
+        }
         let (publisher, watcher) =
             channel(Stage::Instruction(Moment::start_of(Phase::Introduction)));
         let rules = Rules {
@@ -336,7 +357,7 @@ impl Parts {
     }
 }
 
-fn usage(error: &dyn std::fmt::Display) -> RunError {
+pub(super) fn usage(error: &dyn std::fmt::Display) -> RunError {
     RunError::Usage(error.to_string())
 }
 
@@ -356,125 +377,6 @@ fn fresh_learner(profile: &Profile) -> Result<Model, RunError> {
         .map_err(|error| usage(&error))
 }
 
-/// The policy that the order asks for, read and fitting.
-fn order_policy(
-    order: &Order,
-    profile: &Profile,
-) -> Result<Option<record::Policy<Model>>, RunError> {
-    let phases = &profile.session.phases;
-    let teaches = phases.contains(&Wanted::Main);
-    let path = match &order.policy {
-        Some(_) if teaches => {
-            return Err(RunError::Usage(
-                "--policy serves sessions without a main phase, since main teaches a policy of \
-                 its own: add --phases autonomous"
-                    .to_owned(),
-            ));
-        }
-        None if teaches || !phases.contains(&Wanted::Autonomous) => return Ok(None),
-        None => {
-            return Err(RunError::Usage(
-                "without a main phase the robot has learned nothing: give --policy FILE, or \
-                 --policy last for this subject's latest"
-                    .to_owned(),
-            ));
-        }
-        Some(word) if word == "last" => last_policy(order, profile)?,
-        Some(file) => PathBuf::from(file),
-    };
-    let policy: record::Policy<Model> = record::read_policy(&path).map_err(|e| usage(&e))?;
-    let task = profile.experiment.task(profile.tick());
-    let wanted = task.feature_names().len();
-    if policy.task != task.name() || policy.learner.inputs() != wanted {
-        return Err(RunError::Usage(format!(
-            "{}: this policy is for {} with {} inputs, not for {} with {wanted}",
-            path.display(),
-            policy.task,
-            policy.learner.inputs(),
-            task.name(),
-        )));
-    }
-    Ok(Some(policy))
-}
-
-/// The subject's latest final policy for the task.
-fn last_policy(order: &Order, profile: &Profile) -> Result<PathBuf, RunError> {
-    let kept = folder::trials(&order.logs, &order.subject).map_err(|e| usage(&e))?;
-    let task = profile.experiment.name();
-    kept.iter()
-        .rev()
-        .map(|kept| kept.path.join(policy::file_name(None)))
-        .find(|path| record::read_policy::<Model>(path).is_ok_and(|policy| policy.task == task))
-        .ok_or_else(|| {
-            RunError::Usage(format!(
-                "--policy last: subject {} has no policy for {task} in {}; give its file",
-                order.subject,
-                order.logs.display()
-            ))
-        })
-}
-
-/// That the subject's latest session of this task was cut off, and how to go on with it.
-fn cut_off_notice(order: &Order, profile: &Profile) -> Option<String> {
-    let cut = folder::unfinished(&order.logs)
-        .into_iter()
-        .find(|cut| cut.subject == order.subject && cut.task == profile.experiment.name())?;
-    Some(format!(
-        "trial {} was cut at {} {}; to go on with it: coadapt run --resume {}",
-        cut.trial,
-        cut.phase,
-        cut.episode,
-        cut.path.display()
-    ))
-}
-
-/// The mode that the subject had, or the one that fewer subjects have.
-fn assigned_mode(order: &Order, profile: &Profile, seed: u64) -> Mode {
-    let task = profile.experiment.name();
-    assignment::mode_of(&order.logs, &order.subject, task).unwrap_or_else(|| {
-        let so_far = assignment::modes_so_far(&order.logs, task);
-        let mut chance = stream(seed, Purpose::Assignment, Place::default());
-        assignment::assign(&so_far, &mut chance)
-    })
-}
-
-/// The operator that `choice` names.
-fn steer(
-    choice: &Choice,
-    profile: &Profile,
-    seed: u64,
-    company: &Company,
-) -> Result<Box<dyn Operator>, RunError> {
-    let tick = profile.tick();
-    let limit = profile.experiment.task(tick).action_limit();
-    let params = &profile.operator;
-    Ok(match choice {
-        Choice::None => Box::new(operator::Nobody),
-        Choice::Script(file) => {
-            let phases = [Phase::Introduction, Phase::Main]
-                .map(|phase| (phase.word(), Moment::start_of(phase).place().phase));
-            Box::new(Script::load(file, &phases, limit).map_err(|error| usage(&error))?)
-        }
-        Choice::Simulated(skill, kind) => {
-            let Experiment::Balance { plant, .. } = &profile.experiment;
-            Box::new(Simulated::new(&params.simulated, *skill, *kind, seed, tick, plant))
-        }
-        Choice::Keyboard => match company {
-            Company::Attended(Keys { hands, clock }) => {
-                let shaping = Shaping { dead_zone: 0.0, sensitivity: params.sensitivity, limit };
-                Box::new(Keyboard::new(hands.clone(), *clock, &params.keyboard, shaping))
-            }
-            Company::Headless => {
-                return Err(RunError::Usage(
-                    "a headless session has no keyboard: give --operator simulated:average, \
-                     script:FILE or none"
-                        .to_owned(),
-                ));
-            }
-        },
-    })
-}
-
 fn host() -> Host {
     let release = std::fs::read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
     Host {
@@ -482,10 +384,4 @@ fn host() -> Host {
         architecture: std::env::consts::ARCH.to_owned(),
         terminal: std::env::var("TERM").ok(),
     }
-}
-
-/// Where a session would begin, for a screen that shows it before its first tick.
-#[must_use]
-pub fn first_stage(plan: &Plan) -> Stage {
-    machine::begin(plan, None).0
 }

@@ -7,6 +7,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::control::snapshot::{Command, Watcher};
+use crate::tui::terminal::give_back;
 
 /// Remembers the signal that asked the program to end.
 #[derive(Clone, Debug, Default)]
@@ -42,10 +43,12 @@ impl Shutdown {
 
     /// Ends the watched session, in place of an earlier one, when a signal comes or came.
     pub fn abort_on_signal(&self, session: Watcher) {
-        if let Some(signal) = self.signal() {
-            session.ask(abort(signal));
-        }
+        let early = session.clone();
         *self.sessions.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(session);
+        // Looked at after the session is known, so that no signal falls between.
+        if let Some(signal) = self.signal() {
+            early.insist(interrupt(signal));
+        }
     }
 
     /// Ends the watched session, if it still runs.
@@ -57,15 +60,19 @@ impl Shutdown {
     }
 
     fn hear(&self, signal: i32) {
-        self.signal.store(signal, Ordering::SeqCst);
+        if self.signal.swap(signal, Ordering::SeqCst) != 0 {
+            // Asked twice: the terminal is given back, and the session can be resumed.
+            give_back();
+            let _ = signal_hook::low_level::emulate_default_handler(signal);
+        }
         let session = self.sessions.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(session) = &*session {
-            session.ask(abort(signal));
+            session.insist(interrupt(signal));
         }
     }
 }
 
-fn abort(signal: i32) -> Command {
+fn interrupt(signal: i32) -> Command {
     let name = signal_hook::low_level::signal_name(signal).unwrap_or("a signal");
-    Command::Abort(format!("{name} arrived"))
+    Command::Interrupt(format!("{name} arrived"))
 }

@@ -26,6 +26,8 @@ pub struct Running {
     pub frames: Arc<AtomicU64>,
     /// What the profile says about the screen.
     pub screen: profile::Screen,
+    /// What the set-up shows after it: the same choices, the next trial.
+    pub order: Order,
     /// What the person should know before it begins.
     pub notice: Option<String>,
 }
@@ -86,7 +88,7 @@ pub enum End {
 enum Next {
     Setup(Box<Order>),
     Live(Box<Running>),
-    Results(Box<results::Info>, profile::Screen),
+    Results { info: Box<results::Info>, screen: profile::Screen, order: Box<Order> },
     End(End),
 }
 
@@ -99,19 +101,17 @@ pub fn run(
     conductor: &mut dyn Conductor,
     start: Start,
 ) -> Result<End, String> {
-    let mut last = Order::default();
     let mut next = match start {
         Start::Setup(order) => Next::Setup(order),
         Start::Live(running) => Next::Live(running),
     };
     loop {
         next = match next {
-            Next::Setup(order) => {
-                last = (*order).clone();
-                setup_page::show(screen, conductor, *order)?
-            }
+            Next::Setup(order) => setup_page::show(screen, conductor, *order)?,
             Next::Live(running) => live_page::show(screen, conductor, *running)?,
-            Next::Results(info, look) => results_page::show(screen, conductor, &info, &look, &last),
+            Next::Results { info, screen: settings, order } => {
+                results_page::show(screen, conductor, &info, &settings, *order)
+            }
             Next::End(end) => return Ok(end),
         };
     }

@@ -223,7 +223,8 @@ fn read(sender: &SyncSender<Heard>, feed: &Feed, stop: &AtomicBool) {
     if supports_keyboard_enhancement().unwrap_or(false) && is_taken() {
         let flags = KeyboardEnhancementFlags::DISAMBIGUATE_ESCAPE_CODES
             | KeyboardEnhancementFlags::REPORT_EVENT_TYPES
-            | KeyboardEnhancementFlags::REPORT_ALL_KEYS_AS_ESCAPE_CODES;
+            | KeyboardEnhancementFlags::REPORT_ALL_KEYS_AS_ESCAPE_CODES
+            | KeyboardEnhancementFlags::REPORT_ALTERNATE_KEYS;
         if execute!(io::stdout(), PushKeyboardEnhancementFlags(flags)).is_ok() {
             REPORTS_RELEASES.store(true, Ordering::SeqCst);
             feed.hands().set_releases_known(true);

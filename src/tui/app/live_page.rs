@@ -71,10 +71,12 @@ pub(super) fn show(
     loop {
         if let Some(over) = conductor.results() {
             let info = over?;
-            return Ok(page.leaving.map_or_else(
-                || Next::Results(Box::new(info), page.running.screen.clone()),
-                Next::End,
-            ));
+            let Running { screen, order, .. } = page.running;
+            let order = Box::new(order);
+            return Ok(match page.leaving {
+                Some(end) => Next::End(end),
+                None => Next::Results { info: Box::new(info), screen, order },
+            });
         }
         let due = clock.now() + Seconds(frame_s);
         page.draw(screen, clock.now());
@@ -223,7 +225,7 @@ impl Page {
                 End::Signal => "a signal arrived",
                 End::Interrupted | End::Quit => "Ctrl-C was pressed",
             };
-            self.ask(Command::Abort(cause.to_owned()));
+            self.ask(Command::Interrupt(cause.to_owned()));
         }
         self.leaving = Some(end);
     }

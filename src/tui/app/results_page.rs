@@ -16,7 +16,7 @@ pub(super) fn show(
     conductor: &dyn Conductor,
     info: &Info,
     settings: &profile::Screen,
-    last: &Order,
+    order: Order,
 ) -> Next {
     let mut state = State::new(look(settings.glyphs));
     loop {
@@ -32,7 +32,7 @@ pub(super) fn show(
             Some(Action::Next) => state.next(),
             Some(Action::Previous) => state.previous(),
             Some(Action::Help) => state.help_open = !state.help_open,
-            Some(Action::Begin) => return Next::Setup(Box::new(last.clone())),
+            Some(Action::Begin) => return Next::Setup(Box::new(order)),
             Some(Action::Quit | Action::QuitNow) => return Next::End(End::Quit),
             _ => {}
         }

@@ -8,7 +8,7 @@ use crate::tui::pen::{Pen, columns};
 /// Draws the box that belongs to the stage, if one does.
 pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
     let (title, role, lines): (_, _, &[&str]) = match view.panel.stage {
-        Stage::Paused(moment) if moment.phase.is_steered() => {
+        Stage::Paused(moment) if moment.phase.is_steered() && moment.step > 0 => {
             ("PAUSED", Role::Strong, &["P or Enter   go on", "x            discard rollout"])
         }
         Stage::Paused(_) => ("PAUSED", Role::Strong, &["P or Enter   go on"]),

@@ -1,0 +1,146 @@
+//! What an order comes to on this disk: which policy, which mode, which operator.
+
+use std::path::PathBuf;
+
+use super::RunError;
+use super::session::{Company, Keys, usage};
+use crate::learner::{Learner, Model};
+use crate::operator::script::Script;
+use crate::operator::shaping::Shaping;
+use crate::operator::simulated::Simulated;
+use crate::operator::terminal::Keyboard;
+use crate::operator::{self, Choice, Operator};
+use crate::profile::{Experiment, Order, Profile};
+use crate::random::{Place, Purpose, stream};
+use crate::record::{self, assignment, folder, policy};
+use crate::session::plan::Wanted;
+use crate::session::{Moment, Phase};
+use crate::sharing::Mode;
+
+/// The policy that the order asks for, read and fitting.
+pub(super) fn order_policy(
+    order: &Order,
+    profile: &Profile,
+) -> Result<Option<record::Policy<Model>>, RunError> {
+    let phases = &profile.session.phases;
+    let teaches = phases.contains(&Wanted::Main);
+    let path = match &order.policy {
+        Some(_) if teaches => {
+            return Err(RunError::Usage(
+                "--policy serves sessions without a main phase, since main teaches a policy of \
+                 its own: add --phases autonomous"
+                    .to_owned(),
+            ));
+        }
+        None if teaches || !phases.contains(&Wanted::Autonomous) => return Ok(None),
+        None => {
+            return Err(RunError::Usage(
+                "without a main phase the robot has learned nothing: give --policy FILE, or \
+                 --policy last for this subject's latest"
+                    .to_owned(),
+            ));
+        }
+        Some(word) if word == "last" => last_policy(order, profile)?,
+        Some(file) => PathBuf::from(file),
+    };
+    let policy: record::Policy<Model> = record::read_policy(&path).map_err(|e| usage(&e))?;
+    let task = profile.experiment.task(profile.tick());
+    let wanted = task.feature_names().len();
+    if policy.task != task.name() || policy.learner.inputs() != wanted {
+        return Err(RunError::Usage(format!(
+            "{}: this policy is for {} with {} inputs, not for {} with {wanted}",
+            path.display(),
+            policy.task,
+            policy.learner.inputs(),
+            task.name(),
+        )));
+    }
+    let given = order.sets.iter().any(|(key, _)| key == "mode");
+    if given && profile.mode.fixed() != Some(policy.mode) {
+        return Err(RunError::Usage(format!(
+            "{}: this policy was taught in the {} mode: leave --mode out",
+            path.display(),
+            policy.mode.word()
+        )));
+    }
+    Ok(Some(policy))
+}
+
+/// The subject's latest final policy for the task.
+fn last_policy(order: &Order, profile: &Profile) -> Result<PathBuf, RunError> {
+    let kept = folder::trials(&order.logs, &order.subject).map_err(|e| usage(&e))?;
+    let task = profile.experiment.name();
+    kept.iter()
+        .rev()
+        .map(|kept| kept.path.join(policy::file_name(None)))
+        .find(|path| record::read_policy::<Model>(path).is_ok_and(|policy| policy.task == task))
+        .ok_or_else(|| {
+            RunError::Usage(format!(
+                "--policy last: subject {} has no policy for {task} in {}; give its file",
+                order.subject,
+                order.logs.display()
+            ))
+        })
+}
+
+/// That the subject's latest session of this task was cut off, and how to go on with it.
+pub(super) fn cut_off_notice(order: &Order, profile: &Profile) -> Option<String> {
+    let cut = folder::unfinished(&order.logs)
+        .into_iter()
+        .find(|cut| cut.subject == order.subject && cut.task == profile.experiment.name())?;
+    Some(format!(
+        "trial {} was cut at {} {}; to go on with it: coadapt run --resume {}",
+        cut.trial,
+        cut.phase,
+        cut.episode,
+        cut.path.display()
+    ))
+}
+
+/// The mode that the subject had, or the one that fewer subjects have.
+pub(super) fn assigned_mode(order: &Order, profile: &Profile, seed: u64) -> Mode {
+    let task = profile.experiment.name();
+    assignment::mode_of(&order.logs, &order.subject, task).unwrap_or_else(|| {
+        let so_far = assignment::modes_so_far(&order.logs, task);
+        let mut chance = stream(seed, Purpose::Assignment, Place::default());
+        assignment::assign(&so_far, &mut chance)
+    })
+}
+
+/// The operator that `choice` names.
+pub(super) fn steer(
+    choice: &Choice,
+    profile: &Profile,
+    seed: u64,
+    company: &Company,
+) -> Result<Box<dyn Operator>, RunError> {
+    let tick = profile.tick();
+    let limit = profile.experiment.task(tick).action_limit();
+    let params = &profile.operator;
+    Ok(match choice {
+        Choice::None => Box::new(operator::Nobody),
+        Choice::Script(file) => {
+            let phases = [Phase::Introduction, Phase::Main]
+                .map(|phase| (phase.word(), Moment::start_of(phase).place().phase));
+            Box::new(Script::load(file, &phases, limit).map_err(|error| usage(&error))?)
+        }
+        Choice::Simulated(skill, kind) => {
+            let Experiment::Balance { plant, .. } = &profile.experiment;
+            Box::new(Simulated::new(&params.simulated, *skill, *kind, seed, tick, plant))
+        }
+        Choice::Keyboard => match company {
+            Company::Attended(Keys { hands, clock }) => {
+                let shaping = Shaping { dead_zone: 0.0, sensitivity: params.sensitivity, limit };
+                Box::new(Keyboard::new(hands.clone(), *clock, &params.keyboard, shaping))
+            }
+            Company::Headless => {
+                return Err(RunError::Usage(
+                    "a headless session has no keyboard: give --operator simulated:average, \
+                     script:FILE or none; a session that was begun at the keyboard is resumed \
+                     without --headless"
+                        .to_owned(),
+                ));
+            }
+        },
+    })
+}
