@@ -251,8 +251,8 @@ fn a_session_that_still_runs_is_not_taken_over() {
 
 /// A small session into `logs`, which hears of a signal when it has asked for one often.
 fn evaluated(logs: PathBuf, asks_until_signal: u32) -> (Finished, u32) {
-    let mut order = Order { logs, seed: Some(5), ..Order::default() };
-    order.operator = "simulated:expert".to_owned();
+    let operator = "simulated:expert".to_owned();
+    let mut order = Order { logs, operator, seed: Some(5), ..Order::default() };
     order.change("session.phases", "[main, autonomous]");
     order.change("session.main_rollouts", "10");
     order.change("session.autonomous_rollouts", "5");
