@@ -304,6 +304,8 @@ fn a_storm_of_sizes_never_disturbs_the_session() {
 fn shifted_keys_arrive_as_typed_where_keys_are_told_apart() {
     let mut terminal = Seat { answers: Answers::WithKitty, ..Seat::default() }.open("");
     terminal.shows_that("the question is over", |_| terminal.wrote("\x1b[>"));
+    // 4 of these flags asks for the shifted letters.
+    terminal.shows_that("all flags", |_| terminal.wrote("\x1b[>15u"));
     let question_mark = "\x1b[47:63;2u";
     terminal.keys(question_mark);
     terminal.shows("keys: set-up");
