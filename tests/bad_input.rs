@@ -20,7 +20,8 @@ fn refuses(desk: &Desk, line: &str, says: &[&str]) {
     refuses_words(desk, &words, says);
 }
 
-fn refuses_words(desk: &Desk, words: &[&str], says: &[&str]) {
+/// The same for words that may hold spaces; returns what was said.
+fn refuses_words(desk: &Desk, words: &[&str], says: &[&str]) -> String {
     let before = names(&desk.at(""));
     let output = desk.program("").args(words).output().unwrap();
     let message = text(&output.stderr);
@@ -30,6 +31,7 @@ fn refuses_words(desk: &Desk, words: &[&str], says: &[&str]) {
         assert!(message.contains(word), "{words:?}: no {word:?} in {message}");
     }
     assert_eq!(names(&desk.at("")), before, "{words:?} left something behind");
+    message
 }
 
 #[test]
@@ -41,7 +43,9 @@ fn subjects_are_plain_names() {
     for name in names {
         let mut words: Vec<&str> = RUN.split_whitespace().collect();
         words.extend(["--subject", name]);
-        refuses_words(&desk, &words, &["subject", "1 to 64 letters"]);
+        let message = refuses_words(&desk, &words, &["subject", "1 to 64 letters"]);
+        assert!(message.len() < 250, "{message}");
+        assert!(!message.trim_end().contains(char::is_control), "{message:?}");
     }
 }
 
@@ -56,7 +60,9 @@ fn counts_and_times_are_within_their_ranges() {
         refuses(&desk, &format!("{RUN} --duration {duration}"), &["session.main_duration_s"]);
     }
     refuses(&desk, &format!("{RUN} --seed -1"), &["-1"]);
-    refuses(&desk, &format!("{RUN} --trial x"), &["--trial"]);
+    for trial in ["x", "0", "-1", "4294967295", "4294967296"] {
+        refuses(&desk, &format!("{RUN} --trial {trial}"), &["--trial", trial]);
+    }
 }
 
 #[test]
@@ -131,6 +137,7 @@ fn unknown_words_are_told_what_is_known() {
     refuses(&desk, "run --headless", &["PROFILE"]);
     refuses(&desk, "dance", &["dance"]);
     refuses(&desk, "run --headless --resume nowhere", &["nowhere", "no session"]);
+    refuses(&desk, "run --headless --resume nowhere --operator none", &["--resume", "--operator"]);
 }
 
 #[test]
@@ -156,6 +163,9 @@ fn policies_must_be_whole_and_fitting() {
     refuses(&desk, &alone, &["--policy FILE"]);
     refuses(&desk, &format!("{alone} --policy last"), &["anon", "no policy"]);
     refuses(&desk, &format!("{RUN} --policy half.json"), &["--phases autonomous"]);
+    let other_mode = format!("{alone} --logs kept --policy last --mode sequential");
+    refuses(&desk, &other_mode, &["simultaneous", "--mode"]);
+    assert_eq!(names(&desk.at("kept/anon")), [".lock", "001-balance-simultaneous"]);
 }
 
 #[test]

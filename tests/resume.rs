@@ -5,13 +5,18 @@
 #[path = "program/desk.rs"]
 mod desk;
 
+use std::cell::Cell;
 use std::fs;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::LazyLock;
 
-use coadapt::clock::{Clock, WallClock};
+use coadapt::clock::{Clock, VirtualClock, WallClock};
+use coadapt::profile::Order;
+use coadapt::record::Status;
+use coadapt::run::outcome::Finished;
+use coadapt::run::session::{Company, Session};
 use coadapt::signal::Seconds;
 use desk::{Desk, names, text};
 use serde_json::Value;
@@ -242,4 +247,43 @@ fn a_session_that_still_runs_is_not_taken_over() {
     assert_eq!((refused.status.code(), text(&refused.stdout)), (Some(2), String::new()));
     running.killed();
     assert_goes_on(&desk);
+}
+
+/// A small session into `logs`, which hears of a signal when it has asked for one often.
+fn evaluated(logs: PathBuf, asks_until_signal: u32) -> (Finished, u32) {
+    let operator = "simulated:expert".to_owned();
+    let mut order = Order { logs, operator, seed: Some(5), ..Order::default() };
+    order.change("session.phases", "[main, autonomous]");
+    order.change("session.main_rollouts", "10");
+    order.change("session.autonomous_rollouts", "5");
+    let asked = Cell::new(0);
+    let signal = || {
+        asked.set(asked.get() + 1);
+        (asked.get() > asks_until_signal).then_some(15)
+    };
+    let session = Session::begin(&order, Company::Headless).unwrap();
+    let finished = session.run(&mut VirtualClock::default(), signal).unwrap();
+    (finished, asked.get())
+}
+
+#[test]
+fn a_signal_ends_the_evaluation_at_once_and_a_resume_completes_it() {
+    let desk = Desk::new();
+    let (whole, asked) = evaluated(desk.at("whole"), u32::MAX);
+    assert_eq!((whole.results.status, whole.signal), (Status::Complete, None));
+    let soon = asked / 2;
+    let (cut, asked) = evaluated(desk.at("cut"), soon);
+    assert_eq!((cut.results.status, cut.signal), (Status::Interrupted, Some(15)));
+    assert!(asked <= soon + 2, "{asked} looks for a signal that came after {soon}");
+    let read = |finished: &Finished, name: &str| fs::read(finished.folder.join(name)).unwrap();
+    assert_eq!(text(&read(&whole, "evaluation.csv")).lines().count(), 1 + 10 * 5);
+    assert!(!cut.folder.join("evaluation.csv").exists(), "half an evaluation");
+    assert_eq!(status(&cut.folder), "interrupted");
+
+    let session = Session::resume(&cut.folder, Company::Headless).unwrap();
+    let resumed = session.run(&mut VirtualClock::default(), || None).unwrap();
+    assert_eq!(resumed.results.status, Status::Complete);
+    for name in ["evaluation.csv", "steps.csv", "episodes.csv", "policy.json"] {
+        assert!(read(&resumed, name) == read(&whole, name), "{name} differs after a resume");
+    }
 }

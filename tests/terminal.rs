@@ -146,6 +146,18 @@ fn signals_end_a_session_and_give_the_terminal_back() {
 }
 
 #[test]
+fn a_closed_terminal_ends_a_session_as_a_hang_up_does() {
+    let mut terminal = live(Answers::Plainly);
+    terminal.shows_that("rows", |_| terminal.pushes(FOLDER).len() > 10);
+    terminal.close();
+    assert_eq!(terminal.code(), 129);
+    assert_eq!(terminal.session(FOLDER)["status"], "interrupted");
+    assert!(terminal.pushes(FOLDER).len() > 10);
+    let rows = fs::read_to_string(terminal.at(FOLDER).join("steps.csv")).unwrap();
+    assert!(rows.ends_with(",,,,,,,,,0\n"), "no ending state: {rows}");
+}
+
+#[test]
 fn signals_end_the_set_up_too() {
     for (signal, code) in [("TERM", 143), ("HUP", 129), ("INT", 130)] {
         let mut terminal = Seat::default().open("");
@@ -154,6 +166,21 @@ fn signals_end_the_set_up_too() {
         assert_eq!(terminal.code(), code, "SIG{signal}");
         terminal.is_given_back();
     }
+}
+
+#[test]
+fn a_killed_session_says_how_releases_were_known() {
+    let known = |terminal: &Terminal| terminal.session(FOLDER)["key_releases"].clone();
+    let mut terminal = live(Answers::WithKitty);
+    assert_eq!(known(&terminal), "estimated from key repeats", "nobody was asked yet");
+    terminal.shows_that("the question is over", |_| terminal.wrote("\x1b[>"));
+    terminal.shows_that("rows", |_| terminal.pushes(FOLDER).len() > 10);
+    terminal.keys("\x1b[120u");
+    terminal.shows_that("releases known", |_| known(&terminal) == "reported by the terminal");
+    terminal.signal("KILL");
+    terminal.code();
+    assert_eq!(known(&terminal), "reported by the terminal");
+    assert_eq!(terminal.session(FOLDER)["status"], "running");
 }
 
 #[test]
@@ -271,4 +298,130 @@ fn a_storm_of_sizes_never_disturbs_the_session() {
     end(&terminal);
     assert_eq!(terminal.code(), 0);
     terminal.is_given_back();
+}
+
+#[test]
+fn shifted_keys_arrive_as_typed_where_keys_are_told_apart() {
+    let mut terminal = Seat { answers: Answers::WithKitty, ..Seat::default() }.open("");
+    terminal.shows_that("the question is over", |_| terminal.wrote("\x1b[>"));
+    // 4 of these flags asks for the shifted letters.
+    terminal.shows_that("all flags", |_| terminal.wrote("\x1b[>15u"));
+    let question_mark = "\x1b[47:63;2u";
+    terminal.keys(question_mark);
+    terminal.shows("keys: set-up");
+    terminal.keys(question_mark);
+    terminal.shows_that("no help", |screen| !screen.contains("keys: set-up"));
+    // From the profile to the subject.
+    for _ in 0..6 {
+        terminal.keys("\x1b[9u");
+    }
+    terminal.keys("\x1b[115:83;2u\x1b[45:95;2u\x1b[97u");
+    terminal.shows("--subject S_a");
+    terminal.keys("\x03");
+    assert_eq!(terminal.code(), 0);
+    terminal.is_given_back();
+}
+
+#[test]
+fn space_begins_nothing_while_an_instruction_is_read() {
+    let mut terminal = Seat::default().open(CALM);
+    terminal.shows("Enter   begin");
+    terminal.keys("   ");
+    // Far longer than a tick and the countdown.
+    rest(0.5);
+    terminal.shows("Enter   begin");
+    assert!(terminal.pushes(FOLDER).is_empty());
+    terminal.keys("\r");
+    terminal.goes();
+    end(&terminal);
+    assert_eq!(terminal.code(), 0);
+    let events = fs::read_to_string(terminal.at(FOLDER).join("events.csv")).unwrap();
+    assert!(!events.contains("stop"), "{events}");
+}
+
+#[test]
+fn the_next_session_is_the_same_subjects() {
+    let line = "run balance --phases main --mode assigned --subject S07 --logs kept";
+    let mut terminal = Seat::default().open(line);
+    for trial in ["001", "002"] {
+        terminal.shows(&format!("S07   trial {trial}"));
+        terminal.shows("Enter   begin");
+        terminal.keys("qq");
+        terminal.shows("new session");
+        terminal.keys("\r");
+        terminal.shows("the terminal laboratory");
+        terminal.shows("--subject S07");
+        terminal.shows("--logs kept");
+        terminal.keys("\r");
+    }
+    terminal.shows("S07   trial 003");
+    terminal.keys("\x03");
+    assert_eq!(terminal.code(), 130);
+    let mut sessions: Vec<String> = fs::read_dir(terminal.at("kept/S07"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name != ".lock")
+        .collect();
+    sessions.sort();
+    let mode = sessions[0].strip_prefix("001-").unwrap();
+    assert_eq!(sessions, ["001", "002", "003"].map(|trial| format!("{trial}-{mode}")));
+    for name in &sessions {
+        assert_eq!(terminal.session(&format!("kept/S07/{name}"))["assigned"], true);
+    }
+}
+
+#[test]
+fn a_profile_is_saved_where_no_folder_of_profiles_was() {
+    let mut terminal = Seat::default().open("");
+    terminal.shows("Enter begin");
+    terminal.keys("s");
+    terminal.shows("save as");
+    terminal.keys("mine\r");
+    terminal.shows("coadapt run profiles/mine.ron");
+    terminal.keys("q");
+    assert_eq!(terminal.code(), 0);
+    let saved = fs::read_to_string(terminal.at("profiles/mine.ron")).unwrap();
+    assert!(saved.contains("task: \"balance\""), "{saved}");
+}
+
+#[test]
+fn a_broken_profile_is_reported_and_nothing_is_drawn() {
+    let desk = tempfile::tempdir().unwrap();
+    fs::create_dir(desk.path().join("profiles")).unwrap();
+    fs::write(desk.path().join("profiles/balance.ron"), "(task: \"balance\", nonsense: 1)")
+        .unwrap();
+    let mut terminal = Seat { desk: Some(desk), ..Seat::default() }.open("");
+    assert_eq!(terminal.code(), 2);
+    assert!(!terminal.wrote("\x1b[?1049h"), "the screen was taken");
+    terminal.shows("balance.ron:1:");
+    terminal.shows("nonsense");
+}
+
+#[test]
+fn no_row_is_lost_as_fast_as_it_can() {
+    let taught = "run balance --headless --seed 1 --rollouts 5 --phases main \
+        --operator simulated:expert";
+    let mut teacher = Seat::default().open(taught);
+    assert_eq!(teacher.code(), 0);
+    let seat = Seat { desk: Some(teacher.into_desk()), ..Seat::default() };
+    let alone = format!("run balance --seed 1 --phases autonomous --policy {FOLDER}/policy.json");
+    let mut terminal = seat.open(&alone);
+    terminal.shows("Enter   begin");
+    terminal.keys("\r");
+    terminal.goes();
+    terminal.keys("fff");
+    terminal.shows("new session");
+    terminal.keys("q");
+    assert_eq!(terminal.code(), 0);
+    let folder = "logs/anon/002-balance-simultaneous";
+    assert_eq!(terminal.session(folder)["timing"]["lost_rows"], 0);
+    let episodes = fs::read_to_string(terminal.at(folder).join("episodes.csv")).unwrap();
+    let implied: usize = episodes
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').nth(3).unwrap().parse::<usize>().unwrap() + 1)
+        .sum();
+    let rows = fs::read_to_string(terminal.at(folder).join("steps.csv")).unwrap();
+    assert_eq!(rows.lines().count() - 1, implied);
+    assert_eq!(episodes.lines().count(), 1 + 100 + 100);
 }

@@ -165,13 +165,10 @@ fn evaluation(
         metrics::rollouts_of(episodes, Phase::Autonomous).copied().collect();
     let mut rows = Vec::new();
     for (percent, learner) in tenths {
-        if signal().is_some() {
-            return None;
-        }
         let rollouts = if *percent == 100 && !done.is_empty() {
             done.clone()
         } else {
-            evaluate::autonomous(profile, learner, seed)
+            evaluate::autonomous(profile, learner, seed, || signal().is_some())?
         };
         rows.extend(rollouts.iter().map(|row| EvaluationRow {
             policy: policy_name(*percent),

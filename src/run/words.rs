@@ -117,7 +117,8 @@ pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
             profile.experiment.name()
         )));
     }
-    let rows = evaluation::autonomous(&profile, &policy.learner, words.seed);
+    let rows =
+        evaluation::autonomous(&profile, &policy.learner, words.seed, || false).unwrap_or_default();
     let Some(measures) = metrics::phases(&rows, None).autonomous else {
         return Err(RunError::Failed("no rollout took place".to_owned()));
     };

@@ -2,7 +2,7 @@
 
 use crate::backend::safety::{Limits, Safe};
 use crate::backend::simulated::Simulated;
-use crate::clock::VirtualClock;
+use crate::clock::{Pacer, VirtualClock};
 use crate::control::cycle::{Crew, Cycle, Rules};
 use crate::control::witness;
 use crate::learner::Model;
@@ -25,9 +25,14 @@ pub fn simulated_backend(profile: &Profile, seed: u64) -> Safe {
 }
 
 /// The autonomous rollouts of `learner`, on virtual time, with the starts and the noise
-/// that a session of `profile` and `seed` gives its autonomous phase.
-#[must_use]
-pub fn autonomous(profile: &Profile, learner: &Model, seed: u64) -> Vec<EpisodeRow> {
+/// that a session of `profile` and `seed` gives its autonomous phase; none when
+/// `is_enough` says so in between.
+pub fn autonomous(
+    profile: &Profile,
+    learner: &Model,
+    seed: u64,
+    is_enough: impl Fn() -> bool,
+) -> Option<Vec<EpisodeRow>> {
     let tick = profile.tick();
     let mut session = profile.session.clone();
     session.phases = vec![Wanted::Autonomous];
@@ -49,6 +54,13 @@ pub fn autonomous(profile: &Profile, learner: &Model, seed: u64) -> Vec<EpisodeR
         witness: witness::Nobody,
         publisher: None,
     };
-    let cycle = Cycle::new(rules, crew, learner.clone(), None);
-    cycle.run(&mut VirtualClock::default()).episodes
+    let mut cycle = Cycle::new(rules, crew, learner.clone(), None);
+    let mut clock = VirtualClock::default();
+    let mut pacer = Pacer::new(&clock);
+    while cycle.step(&mut clock, &mut pacer) {
+        if is_enough() {
+            return None;
+        }
+    }
+    Some(cycle.run(&mut clock).episodes)
 }

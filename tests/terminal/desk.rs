@@ -5,6 +5,7 @@ use std::io::{Read, Write};
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 
@@ -51,7 +52,9 @@ struct Seen {
 
 /// A terminal with the program on it; the program is killed with it.
 pub struct Terminal {
-    master: Box<dyn MasterPty + Send>,
+    /// None once the terminal was closed.
+    master: Option<Box<dyn MasterPty + Send>>,
+    is_closing: Arc<AtomicBool>,
     child: Box<dyn Child + Send + Sync>,
     writer: Arc<Mutex<Box<dyn Write + Send>>>,
     seen: Arc<Mutex<Seen>>,
@@ -81,10 +84,12 @@ impl Seat {
         let seen = Arc::new(Mutex::new(Seen { raw: Vec::new(), screen }));
         let source = pair.master.try_clone_reader().unwrap();
         let (to, from, answers) = (Arc::clone(&seen), Arc::clone(&writer), self.answers);
-        let reader = std::thread::spawn(move || read(source, &to, &from, answers));
+        let is_closing = Arc::new(AtomicBool::new(false));
+        let is_over = Arc::clone(&is_closing);
+        let reader = std::thread::spawn(move || read(source, &to, &from, answers, &is_over));
         let desk = Some(desk);
-        let (master, reader) = (pair.master, Some(reader));
-        Terminal { master, child, writer, seen, reader, settings, desk }
+        let (master, reader) = (Some(pair.master), Some(reader));
+        Terminal { master, is_closing, child, writer, seen, reader, settings, desk }
     }
 }
 
@@ -102,11 +107,14 @@ fn read(
     seen: &Mutex<Seen>,
     writer: &Mutex<Box<dyn Write + Send>>,
     answers: Answers,
+    is_over: &AtomicBool,
 ) {
     let mut bytes = [0; 4096];
     let mut asked = false;
     // A terminal whose program ended is an error on Linux.
-    while let Ok(count @ 1..) = source.read(&mut bytes) {
+    while !is_over.load(Ordering::SeqCst)
+        && let Ok(count @ 1..) = source.read(&mut bytes)
+    {
         let mut seen = seen.lock().unwrap();
         seen.raw.extend_from_slice(&bytes[..count]);
         seen.screen.process(&bytes[..count]);
@@ -173,13 +181,22 @@ impl Terminal {
 
     pub fn resize(&self, columns: u16, rows: u16) {
         let mut seen = self.seen();
-        self.master.resize(size(columns, rows)).unwrap();
+        self.master.as_ref().unwrap().resize(size(columns, rows)).unwrap();
         seen.screen.screen_mut().set_size(some(rows), some(columns));
     }
 
     pub fn signal(&self, name: &str) {
         let line = format!("kill -{name} {}", self.child.process_id().unwrap());
         assert!(Command::new("sh").args(["-c", &line]).status().unwrap().success());
+    }
+
+    /// Closes the terminal's window, so to say. The program draws, so that the reader hears
+    /// of it.
+    pub fn close(&mut self) {
+        self.is_closing.store(true, Ordering::SeqCst);
+        self.reader.take().unwrap().join().unwrap();
+        *self.writer.lock().unwrap() = Box::new(std::io::sink());
+        self.master = None;
     }
 
     /// Waits for the program's end; its exit code.
@@ -209,7 +226,8 @@ impl Terminal {
         let screen = seen.screen.screen();
         assert!(!screen.alternate_screen(), "still the other screen");
         assert!(!screen.hide_cursor(), "no cursor");
-        assert_eq!(format!("{:?}", self.master.get_termios()), self.settings);
+        let settings = self.master.as_ref().unwrap().get_termios();
+        assert_eq!(format!("{settings:?}"), self.settings);
         let last = |text: &str| {
             let text = text.as_bytes();
             seen.raw.windows(text.len()).rposition(|window| window == text)

@@ -1,0 +1,316 @@
+//! The control cycle with a plant, an operator and a witness made for the test.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking, helpers too")]
+
+use std::sync::{Arc, Mutex};
+
+use coadapt::backend::safety::{Limits, Safe};
+use coadapt::backend::{Backend, Sensed};
+use coadapt::clock::{Pacer, VirtualClock};
+use coadapt::control::cycle::{Crew, Cycle, Outcome, Rules};
+use coadapt::control::snapshot::{Command, Watcher, channel};
+use coadapt::control::witness::{Happening, Standing, Witness};
+use coadapt::learner::Model;
+use coadapt::operator::{Operator, View};
+use coadapt::profile::{Document, Profile};
+use coadapt::random::Place;
+use coadapt::record::{EpisodeRow, StepRow};
+use coadapt::session::machine::{Finish, Stage};
+use coadapt::session::plan::Plan;
+use coadapt::session::{Moment, Phase};
+use coadapt::sharing::Mode;
+use coadapt::signal::{Action, End, Intent, Seconds, State};
+
+const LIMIT: f64 = 10.0;
+const PUSH: f64 = 1.0;
+/// The length of a rollout.
+const TICKS: u32 = 6;
+
+/// What happened, in order.
+#[derive(Clone, Debug, PartialEq)]
+enum Entry {
+    /// The plant was halted,
+    Halt,
+    /// or received this.
+    Applied(f64),
+    /// The witness was told of something, a word,
+    Told(&'static str),
+    /// or was given the policy of a tenth, %.
+    Policy(u8),
+}
+
+/// What all parts of a session write into.
+#[derive(Clone, Default)]
+struct Diary(Arc<Mutex<Vec<Entry>>>);
+
+impl Diary {
+    fn note(&self, entry: Entry) {
+        self.0.lock().unwrap().push(entry);
+    }
+
+    /// What was noted since it was taken last.
+    fn take(&self) -> Vec<Entry> {
+        std::mem::take(&mut *self.0.lock().unwrap())
+    }
+}
+
+/// A plant that rests wherever it is put; its state is lost at one look.
+struct Rest {
+    diary: Diary,
+    state: State,
+    looks: u32,
+    lost_at_look: Option<u32>,
+}
+
+impl Backend for Rest {
+    fn sense(&mut self) -> Sensed {
+        self.looks += 1;
+        if self.lost_at_look == Some(self.looks) {
+            self.state = State::new([f64::NAN; 4]);
+        }
+        Sensed { state: self.state, age: Seconds(0.0) }
+    }
+
+    fn actuate(&mut self, wanted: Action) -> Action {
+        self.diary.note(Entry::Applied(wanted.0));
+        wanted
+    }
+
+    fn halt(&mut self) {
+        self.diary.note(Entry::Halt);
+    }
+
+    fn prepare(&mut self, start: State, _place: Place) {
+        self.state = start;
+    }
+}
+
+/// Pushes to the right, and more so in a repeated rollout.
+struct Pusher(f64);
+
+impl Operator for Pusher {
+    fn begin(&mut self, place: Place, _practice: u32) {
+        self.0 = PUSH * f64::from(1 + place.attempt);
+    }
+
+    fn intent(&mut self, _view: View<'_>) -> Intent {
+        Intent::fresh(self.0)
+    }
+}
+
+/// Notes what it is told, and keeps the policies.
+struct Notary {
+    diary: Diary,
+    policies: Vec<(u8, Model)>,
+}
+
+impl Witness for Notary {
+    fn allow_waiting(&mut self, _may_wait: bool) {}
+    fn step(&mut self, _row: &StepRow) {
+        self.diary.note(Entry::Told("step"));
+    }
+    fn episode(&mut self, _row: &EpisodeRow) {
+        self.diary.note(Entry::Told("episode"));
+    }
+    fn happening(&mut self, happening: Happening) {
+        self.diary.note(Entry::Told(happening.event));
+    }
+    fn standing(&mut self, _standing: Standing) {
+        self.diary.note(Entry::Told("standing"));
+    }
+    fn policy(&mut self, percent: Option<u8>, learner: &Model) {
+        let percent = percent.unwrap_or(100);
+        self.diary.note(Entry::Policy(percent));
+        self.policies.push((percent, learner.clone()));
+    }
+    fn lost(&self) -> u64 {
+        0
+    }
+    fn fault(&self) -> Option<String> {
+        None
+    }
+}
+
+/// A session that is ticked by hand.
+struct Session {
+    cycle: Cycle<Notary>,
+    clock: VirtualClock,
+    pacer: Pacer,
+    watcher: Watcher,
+    diary: Diary,
+}
+
+/// Rollouts of [`TICKS`]; a main phase of fifty ticks, whose tenths end within rollouts.
+fn profile(phases: &str) -> Profile {
+    let text = format!(
+        r#"(
+            task: "balance",
+            rules: (cap_s: 0.12),
+            session: (
+                phases: [{phases}],
+                introduction_rollouts: 3,
+                main_rollouts: None,
+                main_duration_s: Some(1.0),
+                hold_s: 0.0,
+            ),
+        )"#
+    );
+    Document::from_text("control", &text).read().unwrap()
+}
+
+impl Session {
+    fn new(profile: &Profile, attended: bool, lost_at_look: Option<u32>) -> Self {
+        let (tick, seed) = (profile.tick(), 1);
+        let diary = Diary::default();
+        let plan = Plan::new(&profile.session, tick, seed, attended);
+        let first = plan.phases[0].phase;
+        let (publisher, watcher) = channel(Stage::Instruction(Moment::start_of(first)));
+        let fresh = profile.learner.build(4, LIMIT).unwrap();
+        let rules = Rules {
+            plan,
+            tick,
+            mode: Mode::Simultaneous,
+            sharing: profile.sharing.clone(),
+            teaching: profile.teaching.clone(),
+            fresh: fresh.clone(),
+        };
+        let plant = Rest { diary: diary.clone(), state: State::default(), looks: 0, lost_at_look };
+        let limits = Limits { action: LIMIT, stale: Seconds(1.0) };
+        let crew = Crew {
+            task: profile.experiment.task(tick),
+            backend: Safe::new(Box::new(plant), limits),
+            operator: Box::new(Pusher(PUSH)),
+            witness: Notary { diary: diary.clone(), policies: Vec::new() },
+            publisher: Some(publisher),
+        };
+        let cycle = Cycle::new(rules, crew, fresh, None);
+        let clock = VirtualClock::default();
+        let pacer = Pacer::new(&clock);
+        Self { cycle, clock, pacer, watcher, diary }
+    }
+
+    fn ask(&self, command: Command) {
+        assert!(self.watcher.ask(command));
+    }
+
+    fn tick(&mut self, ticks: u32) {
+        for _ in 0..ticks {
+            assert!(self.cycle.step(&mut self.clock, &mut self.pacer), "over already");
+        }
+    }
+
+    fn stage(&self) -> Stage {
+        self.watcher.look().stage
+    }
+
+    fn finish(self) -> Outcome<Notary> {
+        let Self { cycle, mut clock, .. } = self;
+        cycle.run(&mut clock)
+    }
+}
+
+fn applied(entries: &[Entry]) -> Vec<f64> {
+    entries
+        .iter()
+        .filter_map(|entry| match entry {
+            Entry::Applied(force) => Some(*force),
+            _ => None,
+        })
+        .collect()
+}
+
+fn policies(entries: &[Entry]) -> Vec<u8> {
+    entries
+        .iter()
+        .filter_map(|entry| match entry {
+            Entry::Policy(percent) => Some(*percent),
+            _ => None,
+        })
+        .collect()
+}
+
+/// The look within the tick that ends the first rollout: each tick looks before it decides,
+/// while it actuates, and at what came of it.
+const LAST_LOOK: u32 = 3 * (TICKS - 1) + 2;
+
+#[test]
+fn a_trip_at_a_rollouts_end_holds_the_plant_until_a_person_begins_anew() {
+    let mut session = Session::new(&profile("introduction, main"), true, Some(LAST_LOOK));
+    session.ask(Command::Begin);
+    session.tick(TICKS - 1);
+    assert_eq!(applied(&session.diary.take()), [PUSH; TICKS as usize - 1]);
+    session.tick(1);
+    let next =
+        Moment { rollout: 2, steps_before: TICKS.into(), ..Moment::start_of(Phase::Introduction) };
+    assert_eq!(session.stage(), Stage::Stopped(next));
+    session.tick(10);
+    assert_eq!(session.stage(), Stage::Stopped(next));
+    let entries = session.diary.take();
+    assert_eq!(applied(&entries), [0.0], "{entries:?}");
+    assert!(entries.contains(&Entry::Told("tripped")), "{entries:?}");
+    session.ask(Command::Begin);
+    session.tick(3);
+    assert_eq!(applied(&session.diary.take()), [PUSH; 3]);
+    assert!(matches!(session.stage(), Stage::Running(moment) if moment.rollout == 2));
+}
+
+#[test]
+fn a_trip_where_nobody_could_begin_anew_ends_the_session_with_its_cause() {
+    let session = Session::new(&profile("introduction, main"), false, Some(LAST_LOOK));
+    let diary = session.diary.clone();
+    let outcome = session.finish();
+    assert_eq!(outcome.finish, Finish::Aborted);
+    assert_eq!(outcome.cause.as_deref(), Some("the plant's state is not finite"));
+    assert_eq!(applied(&diary.take()), [PUSH, PUSH, PUSH, PUSH, PUSH, 0.0]);
+}
+
+#[test]
+fn a_plant_stops_before_anything_is_written_about_it() {
+    let ends = [
+        Command::Stop,
+        Command::Discard,
+        Command::Pause,
+        Command::Abort("enough".to_owned()),
+        Command::Interrupt("a signal".to_owned()),
+    ];
+    for command in ends {
+        let mut session = Session::new(&profile("introduction, main"), true, None);
+        session.ask(Command::Begin);
+        session.tick(3);
+        session.diary.take();
+        session.ask(command.clone());
+        session.tick(1);
+        let entries = session.diary.take();
+        assert_eq!(entries[0], Entry::Halt, "{command:?}: {entries:?}");
+        assert!(entries.iter().any(|entry| matches!(entry, Entry::Told(_))), "{entries:?}");
+    }
+    let mut session = Session::new(&profile("introduction, main"), true, None);
+    session.ask(Command::Begin);
+    session.tick(TICKS - 1);
+    session.diary.take();
+    session.tick(1);
+    let entries = session.diary.take();
+    let after: Vec<&Entry> = entries.iter().skip_while(|entry| **entry != Entry::Halt).collect();
+    let before = [Entry::Applied(PUSH), Entry::Told("step")];
+    assert_eq!(entries[..2], before, "{entries:?}");
+    assert_eq!(after.len(), entries.len() - 2, "the rollout's end: {entries:?}");
+}
+
+#[test]
+fn a_tenth_crossed_in_a_discarded_attempt_is_stored_anew() {
+    let mut session = Session::new(&profile("main"), true, None);
+    session.ask(Command::Begin);
+    session.tick(5);
+    assert_eq!(policies(&session.diary.take()), [10]);
+    session.ask(Command::Discard);
+    session.tick(5);
+    assert_eq!(policies(&session.diary.take()), [10], "stored again in the repeat");
+    let outcome = session.finish();
+    assert_eq!(outcome.finish, Finish::Complete);
+    assert_eq!(outcome.episodes.iter().filter(|row| row.end == End::Discarded).count(), 1);
+    let stored = outcome.witness.policies;
+    let percents: Vec<u8> = stored.iter().map(|(percent, _)| *percent).collect();
+    assert_eq!(percents, [10, 10, 20, 30, 40, 50, 60, 70, 80, 90, 100, 100]);
+    let [first, repeated] = [0, 1].map(|at| serde_json::to_string(&stored[at].1).unwrap());
+    assert_ne!(first, repeated, "the repeat pushes harder");
+}
