@@ -414,6 +414,29 @@ fn a_sample_of_weight_0_teaches_nothing() {
     assert_ne!(lwpr.submodels()[0].fields(), before);
 }
 
+/// While an input does not move, forgetting wears the variance along it down to 0, by which
+/// nothing can be divided; the field must still learn once the input moves again.
+#[test]
+fn an_input_that_stands_still_does_no_lasting_harm() {
+    let forgetful = Settings {
+        init_lambda: 0.5,
+        final_lambda: 0.5,
+        init_d: InitialMetric::Scalar(1.0),
+        ..Settings::new(1, 1)
+    };
+    let mut lwpr = Lwpr::new(forgetful).unwrap();
+    for _ in 0..3000 {
+        lwpr.learn(&[0.3], &[1.0], 1.0).unwrap();
+    }
+    for k in 0..200 {
+        let x = 0.3 + 0.1 * f64::from(k).sin();
+        lwpr.learn(&[x], &[2.0 * x + 5.0], 1.0).unwrap();
+    }
+    assert_eq!(lwpr.fields(), 1);
+    let beta = lwpr.submodels()[0].fields()[0].regression.projections[0].beta;
+    assert!((beta.abs() - 2.0).abs() < 1e-6, "{beta}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 

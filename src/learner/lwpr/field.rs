@@ -14,8 +14,6 @@ use crate::learner::settings::MAX_INPUTS;
 const NEARLY_NOTHING: f64 = 1e-10;
 /// The direction of a projection turns only to a vector whose square is larger than this.
 const LEAST_SQUARE: f64 = 1e-24;
-/// A variance below this is none but the outcome of forgetting without new samples.
-const WORN_OUT: f64 = 1e-100;
 /// What [`Projection::ripeness`] must exceed for errors to be counted and shapes learned.
 pub(super) const RIPE: f64 = 0.1;
 /// The same for a projection before the next one is added.
@@ -244,21 +242,6 @@ impl Regression {
             && fits(&self.ss_x_res, count * n)
             && fits(&self.s_x_res_y_res, count * n)
             && self.projections.iter().all(Projection::is_sound)
-    }
-
-    /// Starts the sums of a projection anew if forgetting has worn its variance away, since
-    /// it could never learn again.
-    pub fn mend(&mut self, init_s2: f64) {
-        let n = self.mean.len();
-        for (projection, x_res) in
-            self.projections.iter_mut().zip(self.ss_x_res.chunks_exact_mut(n))
-        {
-            if projection.ss_s2 < WORN_OUT {
-                projection.ss_s2 = init_s2;
-                projection.ss_y_res = 0.0;
-                x_res.fill(0.0);
-            }
-        }
     }
 
     /// How many projections count in predictions: the last one only if it has seen enough.

@@ -95,7 +95,6 @@ impl Workshop {
         let sample = Sample { x: &self.x, y, w: activation.w };
         self.next.learn(&sample, &mut self.found);
         if !self.next.is_sound(self.x.len()) {
-            regression.mend(settings.init_s2);
             return regression.predict(&self.x);
         }
         if settings.update_d {
