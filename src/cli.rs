@@ -58,7 +58,7 @@ pub struct Run {
     /// simultaneous, sequential or assigned.
     #[arg(long, value_name = "MODE")]
     pub mode: Option<String>,
-    /// rfwr.
+    /// rfwr or lwpr.
     #[arg(long, value_name = "LEARNER")]
     pub learner: Option<String>,
     /// `keyboard`, `script:FILE`, `simulated:naive|average|expert[:TYPE]` or `none`.

@@ -5,9 +5,11 @@
 #![expect(clippy::inline_always, reason = "loops of a constant length are unrolled: see `Size`")]
 
 mod kernel;
+pub mod lwpr;
 mod metric;
 mod params;
 pub mod rfwr;
+mod settings;
 mod shapes;
 
 use serde::{Deserialize, Serialize};
@@ -72,36 +74,43 @@ pub enum Refusal {
 pub enum Model {
     /// Receptive Field Weighted Regression.
     Rfwr(rfwr::Rfwr),
+    /// Locally Weighted Projection Regression.
+    Lwpr(lwpr::Lwpr),
 }
 
 impl Learner for Model {
     fn inputs(&self) -> usize {
         match self {
             Self::Rfwr(rfwr) => rfwr.inputs(),
+            Self::Lwpr(lwpr) => lwpr.inputs(),
         }
     }
 
     fn outputs(&self) -> usize {
         match self {
             Self::Rfwr(rfwr) => rfwr.outputs(),
+            Self::Lwpr(lwpr) => lwpr.outputs(),
         }
     }
 
     fn update(&mut self, x: &[f64], y: &[f64], weight: f64) -> Result<(), Refusal> {
         match self {
             Self::Rfwr(rfwr) => rfwr.update(x, y, weight),
+            Self::Lwpr(lwpr) => lwpr.update(x, y, weight),
         }
     }
 
     fn predict(&self, x: &[f64], y: &mut [f64]) -> f64 {
         match self {
             Self::Rfwr(rfwr) => rfwr.predict(x, y),
+            Self::Lwpr(lwpr) => lwpr.predict(x, y),
         }
     }
 
     fn fields(&self) -> usize {
         match self {
             Self::Rfwr(rfwr) => rfwr.fields(),
+            Self::Lwpr(lwpr) => lwpr.fields(),
         }
     }
 }

@@ -92,6 +92,16 @@ fn assert_keys(value: &Value, keys: &[&str]) {
 }
 
 #[test]
+fn the_other_learner_learns_too() {
+    let (desk, json) = small("--mode simultaneous --learner lwpr");
+    assert_eq!(json["learner"], "lwpr");
+    let policy = fs::read_to_string(desk.at(SIMULTANEOUS).join("policy.json")).unwrap();
+    let policy: Value = serde_json::from_str(&policy).unwrap();
+    let learned = &policy["learner"]["lwpr"];
+    assert!(learned["samples"].as_u64().unwrap() > 100, "{policy}");
+}
+
+#[test]
 fn a_default_session_prints_one_object_with_the_contracts_keys() {
     let desk = Desk::new();
     let printed = desk.succeed(

@@ -2,51 +2,23 @@
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking, helpers too")]
 
-use std::fs::File;
-use std::io::Read;
-use std::path::PathBuf;
+#[path = "learner/golden.rs"]
+mod golden;
 
 use coadapt::learner::rfwr::{Growth, InitialMetric, Rfwr, Settings};
 use coadapt::learner::{Kernel, Learner, Model, Params};
-use flate2::read::GzDecoder;
+use golden::{agree, numbers, read, sample, stored, table, wild};
 use proptest::prelude::*;
 use serde_json::Value;
 
 const CASES: [&str; 6] = [
-    "a_1d",
-    "b_2d_cross_diag",
-    "c_2d_cross_full_meta",
-    "d_4d_cartpole",
-    "e_2d_2out_bisquare",
-    "f_1d_rate_halving",
+    "rfwr/a_1d",
+    "rfwr/b_2d_cross_diag",
+    "rfwr/c_2d_cross_full_meta",
+    "rfwr/d_4d_cartpole",
+    "rfwr/e_2d_2out_bisquare",
+    "rfwr/f_1d_rate_halving",
 ];
-
-fn read(case: &str, file: &str) -> String {
-    let path: PathBuf =
-        [env!("CARGO_MANIFEST_DIR"), "tests/data/rfwr", case, file].iter().collect();
-    let mut text = String::new();
-    let file = File::open(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    if path.extension().is_some_and(|extension| extension == "gz") {
-        GzDecoder::new(file).read_to_string(&mut text).unwrap();
-    } else {
-        { file }.read_to_string(&mut text).unwrap();
-    }
-    text
-}
-
-/// The rows of a table of numbers, without its head.
-fn table(case: &str, file: &str) -> Vec<Vec<f64>> {
-    let number = |cell: &str| cell.parse().unwrap();
-    read(case, file).lines().skip(1).map(|row| row.split(',').map(number).collect()).collect()
-}
-
-/// A number, list or matrix, row by row.
-fn numbers(value: &Value) -> Vec<f64> {
-    match value {
-        Value::Array(items) => items.iter().flat_map(numbers).collect(),
-        other => vec![other.as_f64().unwrap()],
-    }
-}
 
 fn settings(case: &str) -> Settings {
     let case: Value = serde_json::from_str(&read(case, "case.json")).unwrap();
@@ -80,24 +52,6 @@ fn settings(case: &str) -> Settings {
         min_n_data_factor: number("min_n_data_factor"),
         cutoff: number("cutoff_update"),
         ..Settings::new(count("n_in"), count("n_out"))
-    }
-}
-
-/// Demands that the columns agree, relative to the golden column's range.
-fn agree(what: &str, golden: &[Vec<f64>], ours: &[Vec<f64>], tolerance: f64) {
-    assert_eq!(golden.len(), ours.len(), "{what}");
-    for column in 0..golden[0].len() {
-        let values = || golden.iter().map(|row| row[column]);
-        let range = values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min);
-        for (row, (golden, ours)) in golden.iter().zip(ours).enumerate() {
-            let error = (golden[column] - ours[column]).abs();
-            assert!(
-                error <= tolerance * range.max(1e-300),
-                "{what}, row {row}, column {column}: {} for {}",
-                ours[column],
-                golden[column]
-            );
-        }
     }
 }
 
@@ -237,18 +191,6 @@ fn profiled(params: &Params, inputs: usize) -> Model {
     Params { norm_in: vec![1.0; inputs], ..params.clone() }.build(inputs, 10.0).unwrap()
 }
 
-fn stored(model: &impl serde::Serialize) -> String {
-    serde_json::to_string(model).unwrap()
-}
-
-/// A smooth bent function of two inputs, sampled along a path that fills the square.
-fn sample(k: u32) -> ([f64; 2], [f64; 1]) {
-    let k = f64::from(k);
-    let (a, b) = ((k * 0.754_877_666).fract(), (k * 0.569_840_291).fract());
-    let x = [2.0 * a - 1.0, 2.0 * b - 1.0];
-    (x, [(3.0 * x[0]).sin() + x[1] * x[1] + 0.05 * (k * 12.9898).sin()])
-}
-
 #[test]
 fn a_reloaded_learner_is_equal_and_learns_on_equally() {
     for (diag_only, meta) in [(true, false), (false, true)] {
@@ -374,15 +316,6 @@ fn a_sample_of_weight_0_teaches_nothing() {
     assert_ne!(rfwr.field_states(), before);
 }
 
-/// Numbers of every size up to 10^±`decades`, and exactly 0.
-fn wild(decades: i32) -> impl Strategy<Value = f64> {
-    (-decades..=decades, -10.0..10.0, 0..8_u8).prop_map(|(power, digits, dice)| match dice {
-        0 => 0.0,
-        1..=4 => digits / 5.0,
-        _ => digits / 10.0 * 10_f64.powi(power),
-    })
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
@@ -395,7 +328,7 @@ proptest! {
     ) {
         let kernel = if bi_square { Kernel::BiSquare } else { Kernel::Gaussian };
         let params = Params { diag_only, meta, kernel, ..Params::default() };
-        let Model::Rfwr(mut rfwr) = profiled(&params, 2);
+        let Model::Rfwr(mut rfwr) = profiled(&params, 2) else { panic!("another learner") };
         for (x, y, weight) in &samples {
             let update = rfwr.learn(x, &[*y], *weight).unwrap();
             prop_assert!(update.output[0].abs() <= 10.0);

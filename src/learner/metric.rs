@@ -69,9 +69,20 @@ pub struct Rules {
     pub gamma: f64,
     /// The meta learning rate; `None` keeps the rates.
     pub meta_rate: Option<f64>,
+    /// What becomes of a step that is too large.
+    pub oversized: Oversized,
     /// The smallest and largest entry of M's diagonal; entries off it stay within ± the
     /// largest. Ours.
     pub bounds: Option<(f64, f64)>,
+}
+
+/// What becomes of a step beyond the largest allowed, besides halving its learning rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Oversized {
+    /// Half of it is taken (RFWR).
+    Halved,
+    /// None of it is (LWPR).
+    Skipped,
 }
 
 /// The derivatives of w and J₂ with respect to one entry of M.
@@ -206,7 +217,10 @@ impl Metric {
         // Signed, as published: only steps that widen the field are held back.
         if step > limit {
             next.alpha[at] /= 2.0;
-            step /= 2.0;
+            step = match rules.oversized {
+                Oversized::Halved => step / 2.0,
+                Oversized::Skipped => 0.0,
+            };
         }
         next.m[at] = self.m[at] - step;
     }

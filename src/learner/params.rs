@@ -3,7 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::kernel::Kernel;
-use super::rfwr::{InitialMetric, Rfwr, Settings};
+use super::lwpr::{self, Lwpr};
+use super::rfwr::{self, Rfwr};
+use super::settings::InitialMetric;
 use super::{BuildError, Model};
 use crate::check::{Check, Checker};
 
@@ -17,6 +19,8 @@ pub enum Kind {
     /// Receptive Field Weighted Regression, see [`rfwr`](super::rfwr).
     #[default]
     Rfwr,
+    /// Locally Weighted Projection Regression, see [`lwpr`](super::lwpr).
+    Lwpr,
 }
 
 /// What a profile says about the learner. Lengths are in units of the norms.
@@ -45,8 +49,13 @@ pub struct Params {
     pub final_lambda: f64,
     /// How slowly it does: λ ← τλ + final·(1 − τ).
     pub tau_lambda: f64,
-    /// The diagonal of the inverse covariance P of new fields.
+    /// The diagonal of the inverse covariance P of new fields; RFWR only.
     pub init_p: f64,
+    /// The variance along a new projection; LWPR only.
+    pub init_s2: f64,
+    /// A projection is added once the last one has brought the error below this share of
+    /// what it was without it; LWPR only.
+    pub add_threshold: f64,
     /// Whether fields are aligned with the axes.
     pub diag_only: bool,
     /// Whether D is learned at all.
@@ -82,6 +91,8 @@ impl Default for Params {
             final_lambda: 0.9999,
             tau_lambda: 0.99999,
             init_p: 1e10,
+            init_s2: 1e-10,
+            add_threshold: 0.5,
             diag_only: true,
             update_d: true,
             meta: false,
@@ -103,7 +114,14 @@ impl Params {
     /// # Errors
     /// When `norm_in` has another length than `inputs`, or a value is outside its range.
     pub fn build(&self, inputs: usize, output_limit: f64) -> Result<Model, BuildError> {
-        let settings = Settings {
+        match self.kind {
+            Kind::Rfwr => Ok(Model::Rfwr(Rfwr::new(self.rfwr(inputs, output_limit))?)),
+            Kind::Lwpr => Ok(Model::Lwpr(Lwpr::new(self.lwpr(inputs, output_limit))?)),
+        }
+    }
+
+    fn rfwr(&self, inputs: usize, output_limit: f64) -> rfwr::Settings {
+        rfwr::Settings {
             kernel: self.kernel,
             diag_only: self.diag_only,
             update_d: self.update_d,
@@ -125,10 +143,35 @@ impl Params {
             d_floor: Some(self.d_floor),
             d_ceiling: Some(self.d_ceiling),
             min_one_minus_h: Some(self.min_one_minus_h),
-            ..Settings::new(inputs, 1)
-        };
-        match self.kind {
-            Kind::Rfwr => Ok(Model::Rfwr(Rfwr::new(settings)?)),
+            ..rfwr::Settings::new(inputs, 1)
+        }
+    }
+
+    fn lwpr(&self, inputs: usize, output_limit: f64) -> lwpr::Settings {
+        lwpr::Settings {
+            kernel: self.kernel,
+            diag_only: self.diag_only,
+            update_d: self.update_d,
+            meta: self.meta,
+            meta_rate: self.meta_rate,
+            penalty: self.penalty,
+            init_alpha: self.init_alpha,
+            init_d: InitialMetric::Scalar(self.init_d),
+            norm_in: self.norm_in.clone(),
+            norm_out: vec![self.norm_out],
+            w_gen: self.w_gen,
+            w_prune: self.w_prune,
+            init_lambda: self.init_lambda,
+            final_lambda: self.final_lambda,
+            tau_lambda: self.tau_lambda,
+            init_s2: self.init_s2,
+            add_threshold: self.add_threshold,
+            max_fields: Some(self.max_fields),
+            output_limit: Some(output_limit),
+            d_floor: Some(self.d_floor),
+            d_ceiling: Some(self.d_ceiling),
+            min_one_minus_h: Some(self.min_one_minus_h),
+            ..lwpr::Settings::new(inputs, 1)
         }
     }
 }
@@ -147,6 +190,8 @@ impl Check for Params {
         c.range("final_lambda", self.final_lambda, 0.5..=1.0);
         c.range("tau_lambda", self.tau_lambda, 0.0..=1.0);
         c.range("init_p", self.init_p, 1e-6..=1e15);
+        c.range("init_s2", self.init_s2, 1e-15..=1e6);
+        c.range("add_threshold", self.add_threshold, 0.0..=1.0);
         c.range("meta_rate", self.meta_rate, 0.0..=1e6);
         c.range("d_floor", self.d_floor, 1e-6..=1e6);
         c.range("d_ceiling", self.d_ceiling, 1e-6..=1e9);
@@ -222,6 +267,8 @@ mod tests {
                 final_lambda: 0.5,
                 tau_lambda: 0.0,
                 init_p: 1e-6,
+                init_s2: 1e-15,
+                add_threshold: 0.0,
                 meta_rate: 0.0,
                 d_floor: 1e-6,
                 d_ceiling: 1e-6,
@@ -241,6 +288,8 @@ mod tests {
                 final_lambda: 1.0,
                 tau_lambda: 1.0,
                 init_p: 1e15,
+                init_s2: 1e6,
+                add_threshold: 1.0,
                 meta_rate: 1e6,
                 d_floor: 1e6,
                 d_ceiling: 1e9,
@@ -252,7 +301,10 @@ mod tests {
         );
         for params in [least, most] {
             assert_eq!(refused(&params), [""; 0]);
-            assert!(params.build(params.norm_in.len(), 10.0).is_ok());
+            for kind in [Kind::Rfwr, Kind::Lwpr] {
+                let params = Params { kind, ..params.clone() };
+                assert!(params.build(params.norm_in.len(), 10.0).is_ok());
+            }
         }
     }
 }

@@ -48,7 +48,9 @@ mod workshop;
 use serde::{Deserialize, Serialize};
 
 pub use field::{Errors, Field, Regression};
-pub use settings::{InitialMetric, MAX_INPUTS, Settings};
+pub use settings::Settings;
+
+pub use super::settings::{InitialMetric, MAX_INPUTS};
 
 use super::metric::Metric;
 use super::shapes::{Nearest, Shapes, Size, distance};

@@ -114,6 +114,16 @@ impl Shapes {
         self.centres.drain(field * n..(field + 1) * n);
         self.metrics.drain(field * entries..(field + 1) * entries);
     }
+
+    /// Removes `field`; the last one takes its place.
+    pub fn swap_remove(&mut self, field: usize) {
+        let entries = self.entries();
+        for (values, width) in [(&mut self.centres, self.inputs), (&mut self.metrics, entries)] {
+            let last = values.len() - width;
+            values.copy_within(last.., field * width);
+            values.truncate(last);
+        }
+    }
 }
 
 /// Whether every number on the diagonal of the metric `d` is a normal positive one.
@@ -174,6 +184,19 @@ mod tests {
         assert!(shapes.holds(2, true, 2));
         assert_eq!(shapes.centre(1), [2.0, -2.0]);
         assert_eq!(shapes.metric(1), [3.0, 4.0]);
+    }
+
+    #[test]
+    fn a_swap_removal_moves_the_last_field_into_the_gap() {
+        let mut shapes = Shapes::new(1, true);
+        for field in 0..3 {
+            shapes.push(&[f64::from(field)], &[f64::from(field) + 1.0]);
+        }
+        shapes.swap_remove(0);
+        assert_eq!((shapes.centre(0), shapes.metric(0)), (&[2.0][..], &[3.0][..]));
+        shapes.swap_remove(1);
+        assert!(shapes.holds(1, true, 1));
+        assert_eq!(shapes.centre(0), [2.0]);
     }
 
     #[test]

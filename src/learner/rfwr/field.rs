@@ -5,10 +5,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::settings::{MAX_INPUTS, MAX_OUTPUTS, Settings};
+use super::settings::Settings;
 use crate::learner::all_finite;
 use crate::learner::kernel::Activation;
 use crate::learner::metric::{Cost, Metric};
+use crate::learner::settings::{MAX_INPUTS, MAX_OUTPUTS};
 use crate::learner::shapes::Size;
 
 /// P beyond this is no knowledge but the outcome of forgetting without new directions.

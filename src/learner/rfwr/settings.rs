@@ -1,29 +1,11 @@
 //! What Receptive Field Weighted Regression is told beforehand.
 
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use crate::learner::BuildError;
 use crate::learner::kernel::Kernel;
-use crate::learner::shapes::{Size, is_positive};
-
-/// The most inputs a learner takes.
-pub const MAX_INPUTS: usize = 64;
-/// The most outputs.
-pub const MAX_OUTPUTS: usize = 64;
-
-/// The metric that new fields start with, in normalised coordinates.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum InitialMetric {
-    /// The same width in all directions: D = d I.
-    Scalar(f64),
-    /// A width per direction.
-    Diagonal(Vec<f64>),
-    /// The whole symmetric matrix, by rows; not with `diag_only`, which would ignore what is
-    /// off the diagonal.
-    Full(Vec<Vec<f64>>),
-}
+use crate::learner::settings::{BIG, InitialMetric, SMALL, check_sizes, diagonal, range};
+use crate::learner::shapes::Size;
 
 /// All settings of the algorithm, named as in the literature. [`Settings::new`] gives the
 /// published values; what is marked "ours" is off there.
@@ -156,52 +138,17 @@ impl Settings {
     /// When a number of the settings is outside its range, a length does not fit, or
     /// `init_d` is no metric.
     pub(super) fn start(&self) -> Result<(Vec<f64>, Vec<f64>), BuildError> {
-        self.check_lengths()?;
-        self.check_ranges()?;
         let n = self.inputs;
-        let matrix = match &self.init_d {
-            InitialMetric::Scalar(d) => DMatrix::from_diagonal_element(n, n, *d),
-            InitialMetric::Diagonal(d) => {
-                length("init_d", d.len(), n)?;
-                DMatrix::from_diagonal(&d.clone().into())
-            }
-            InitialMetric::Full(_) if self.diag_only => {
-                return Err(BuildError::FullMetric);
-            }
-            InitialMetric::Full(rows) => {
-                length("init_d", rows.len(), n)?;
-                rows.iter().try_for_each(|row| length("init_d", row.len(), n))?;
-                DMatrix::from_fn(n, n, |a, b| rows[a][b])
-            }
-        };
-        if matrix != matrix.transpose() {
-            return Err(BuildError::NoMetric);
+        check_sizes((n, &self.norm_in), (self.outputs, &self.norm_out))?;
+        self.check_ranges()?;
+        if self.diag_only && matches!(self.init_d, InitialMetric::Full(_)) {
+            return Err(BuildError::FullMetric);
         }
-        let lower = matrix.clone().cholesky().ok_or(BuildError::NoMetric)?.unpack();
-        // nalgebra stores by columns: Mᵀ by columns is M by rows.
-        let (d, m) = if self.diag_only {
-            (matrix.diagonal().as_slice().to_vec(), lower.diagonal().as_slice().to_vec())
-        } else {
-            (matrix.as_slice().to_vec(), lower.as_slice().to_vec())
-        };
-        let sound = d.iter().chain(&m).all(|value| value.is_finite());
-        if sound && is_positive(&d, n) { Ok((d, m)) } else { Err(BuildError::NoMetric) }
-    }
-
-    fn check_lengths(&self) -> Result<(), BuildError> {
-        let sizes = [("inputs", self.inputs), ("outputs", self.outputs)];
-        for (key, given) in sizes {
-            if !(1..=MAX_INPUTS).contains(&given) {
-                return Err(BuildError::Size { key, given });
-            }
-        }
-        length("norm_in", self.norm_in.len(), self.inputs)?;
-        length("norm_out", self.norm_out.len(), self.outputs)
+        let (d, m) = self.init_d.factorise(n)?;
+        Ok(if self.diag_only { (diagonal(&d, n), diagonal(&m, n)) } else { (d, m) })
     }
 
     fn check_ranges(&self) -> Result<(), BuildError> {
-        const SMALL: f64 = 1e-12;
-        const BIG: f64 = 1e12;
         let optional = [
             ("output_limit", self.output_limit, 0.0, f64::MAX),
             ("d_floor", self.d_floor, SMALL, BIG),
@@ -225,19 +172,7 @@ impl Settings {
             ("min_n_data_factor", self.min_n_data_factor, 0.0, BIG),
             ("cutoff", self.cutoff, SMALL, 0.5),
         ];
-        let norms_in = self.norm_in.iter().map(|&norm| ("norm_in", norm, SMALL, BIG));
-        let norms_out = self.norm_out.iter().map(|&norm| ("norm_out", norm, SMALL, BIG));
-        for (key, value, from, to) in
-            always.into_iter().chain(optional).chain(norms_in).chain(norms_out)
-        {
-            if !(from..=to).contains(&value) {
-                return Err(BuildError::Range { key, value, from, to });
-            }
-        }
-        Ok(())
+        let mut all = always.into_iter().chain(optional);
+        all.try_for_each(|(key, value, from, to)| range(key, value, from, to))
     }
-}
-
-fn length(key: &'static str, given: usize, wanted: usize) -> Result<(), BuildError> {
-    if given == wanted { Ok(()) } else { Err(BuildError::Length { key, given, wanted }) }
 }

@@ -1,9 +1,10 @@
 //! Where one field after the other learns a sample.
 
 use super::field::{Field, Findings, Sample};
-use super::settings::{MAX_INPUTS, Settings};
+use super::settings::Settings;
 use crate::learner::kernel::{Activation, Window};
-use crate::learner::metric::{Descent, Metric, Rules};
+use crate::learner::metric::{Descent, Metric, Oversized, Rules};
+use crate::learner::settings::MAX_INPUTS;
 use crate::learner::shapes::{Size, is_positive};
 use crate::learner::{BuildError, all_finite};
 
@@ -50,6 +51,7 @@ impl Workshop {
             rules: Rules {
                 gamma: settings.gamma(),
                 meta_rate: settings.meta.then_some(settings.meta_rate),
+                oversized: Oversized::Halved,
                 bounds: settings.bounds(),
             },
             next_d: start_d.clone(),

@@ -399,7 +399,7 @@ pub(super) fn sensitivity_level(sensitivity: f64) -> f64 {
 const MODES: [WantedMode; 3] =
     [WantedMode::Simultaneous, WantedMode::Sequential, WantedMode::Assigned];
 /// The words of the learners, as profiles spell them.
-const LEARNERS: [&str; 1] = ["rfwr"];
+const LEARNERS: [&str; 2] = ["rfwr", "lwpr"];
 const OPERATORS: [&str; 4] = ["keyboard", "simulated", "script", "none"];
 
 /// The one of `all` after `current`, or before it, all around.
