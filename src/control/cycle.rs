@@ -96,7 +96,6 @@ pub(super) struct Mind {
 pub(super) struct Rollout {
     pub(super) start: f64,
     pub(super) total_reward: f64,
-    pub(super) steps: u32,
 }
 
 /// A session under way.
@@ -264,7 +263,6 @@ impl<W: Witness> Cycle<W> {
             self.crew.operator.told(&told);
         }
         self.rollout.total_reward += reward;
-        self.rollout.steps += 1;
         let row = StepRow {
             phase: moment.phase,
             episode: moment.rollout,

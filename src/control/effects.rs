@@ -147,7 +147,6 @@ impl<W: Witness> Cycle<W> {
         let region = self.crew.task.region(&state);
         let is_main = moment.phase == Phase::Main;
         let fields = u32::try_from(self.mind.learner.fields()).unwrap_or(u32::MAX);
-        let steps = self.rollout.steps.max(1);
         EpisodeRow {
             phase: moment.phase,
             episode: moment.rollout,
@@ -156,7 +155,7 @@ impl<W: Witness> Cycle<W> {
             duration_s: f64::from(moment.step) * self.rules.tick.0,
             end,
             total: self.rollout.total_reward,
-            mean_reward: self.rollout.total_reward / f64::from(steps),
+            mean_reward: self.rollout.total_reward / f64::from(moment.step.max(1)),
             share: match moment.phase {
                 Phase::Introduction => Some(1.0),
                 Phase::Main => Some(self.mind.sharing.share(region)),

@@ -13,10 +13,10 @@ use super::scene::{Light, cart_pole};
 use super::{briefing, help, small};
 use crate::control::snapshot::Snapshot;
 use crate::record::EpisodeRow;
+use crate::report::metrics;
 use crate::session::Phase;
 use crate::session::machine::{Finish, Stage};
 use crate::session::plan::PhasePlan;
-use crate::signal::End;
 
 /// What picture belongs to the plant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,18 +101,8 @@ impl History {
     /// The durations of the rollouts of `phase` that count, s.
     #[must_use]
     pub fn durations(&self, phase: Phase) -> Vec<f64> {
-        self.rollouts
-            .iter()
-            .filter(|row| row.phase == phase && counts(row))
-            .map(|row| row.duration_s)
-            .collect()
+        metrics::rollouts_of(&self.rollouts, phase).map(|row| row.duration_s).collect()
     }
-}
-
-/// Whether a rollout came to its own end.
-#[must_use]
-pub const fn counts(row: &EpisodeRow) -> bool {
-    !matches!(row.end, End::Discarded | End::Aborted)
 }
 
 /// The state of the screen itself.

@@ -12,6 +12,7 @@ use super::pen::{Pen, columns};
 use super::text::{cut, fixed, mean, real};
 use super::{help, live, small};
 use crate::record::EpisodeRow;
+use crate::report::metrics;
 use crate::session::Phase;
 
 /// What a session came to.
@@ -36,7 +37,7 @@ pub struct Info {
 impl Info {
     /// The rollouts of `phase` that count.
     fn of(&self, phase: Phase) -> impl Iterator<Item = &EpisodeRow> {
-        self.rollouts.iter().filter(move |row| row.phase == phase && live::counts(row))
+        metrics::rollouts_of(&self.rollouts, phase)
     }
 }
 
