@@ -4,13 +4,20 @@
 
 #![expect(clippy::inline_always, reason = "loops of a constant length are unrolled: see `Size`")]
 
+mod columns;
+mod growth;
 mod kernel;
+mod lanes;
 pub mod lwpr;
 mod metric;
+mod near;
 mod params;
+mod records;
 pub mod rfwr;
+mod sample;
 mod settings;
 mod shapes;
+mod store;
 
 use serde::{Deserialize, Serialize};
 
@@ -166,10 +173,4 @@ pub enum BuildError {
         /// Its index.
         field: usize,
     },
-}
-
-#[inline(always)]
-fn all_finite(values: &[f64]) -> bool {
-    // Without an early exit the check is cheap: the compiler compares several at a time.
-    values.iter().fold(true, |all, value| all & value.is_finite())
 }

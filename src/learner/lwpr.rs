@@ -44,6 +44,7 @@
 //! diagonal is positive; otherwise the field drops that sample, or that step of its metric.
 
 mod field;
+mod regression;
 mod settings;
 mod shaping;
 mod submodel;
@@ -51,12 +52,14 @@ mod workshop;
 
 use serde::{Deserialize, Serialize};
 
-pub use field::{Field, Opinion, Projection, Regression};
+pub use field::{Field, Projection, Regression};
 pub use settings::Settings;
 pub use submodel::Submodel;
 
+pub use super::growth::Growth;
 pub use super::settings::{InitialMetric, MAX_INPUTS};
 
+use super::sample::{divide, settled};
 use super::{BuildError, Learner, Refusal};
 use submodel::Voices;
 use workshop::Workshop;
@@ -66,22 +69,21 @@ pub const UNKNOWN: f64 = 1e20;
 
 /// The learner.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(try_from = "Stored")]
+#[serde(try_from = "Stored", into = "Stored")]
 pub struct Lwpr {
     settings: Settings,
     samples: u64,
     submodels: Vec<Submodel>,
-    #[serde(skip_serializing)]
     workshop: Workshop,
 }
 
-/// A learner as read from a file, before it is checked.
-#[derive(Deserialize)]
+/// A learner as in a file.
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Stored {
     settings: Settings,
     samples: u64,
-    submodels: Vec<Submodel>,
+    submodels: Vec<submodel::Stored>,
 }
 
 /// What an update did.
@@ -105,27 +107,6 @@ pub struct Change {
     pub growth: Growth,
 }
 
-/// How an update changed the set of an output's fields.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Growth {
-    /// Not at all.
-    None,
-    /// A field was appended.
-    Added {
-        /// Its index.
-        field: usize,
-        /// The field whose metric, rates, offset and number of projections it took over.
-        template: Option<usize>,
-    },
-    /// A field was removed; the last one moved into its place.
-    Pruned {
-        /// Its index before.
-        field: usize,
-        /// The overlapping field that stays, by its index before.
-        survivor: usize,
-    },
-}
-
 impl Lwpr {
     /// A learner that knows nothing.
     ///
@@ -133,7 +114,8 @@ impl Lwpr {
     /// When a setting is outside its range or a length does not fit.
     pub fn new(settings: Settings) -> Result<Self, BuildError> {
         let workshop = Workshop::new(&settings)?;
-        let submodels = (0..settings.outputs).map(|_| Submodel::new(&settings)).collect();
+        let fresh = |_| Submodel::new(&settings, &workshop);
+        let submodels = (0..settings.outputs).map(fresh).collect();
         Ok(Self { settings, samples: 0, submodels, workshop })
     }
 
@@ -157,11 +139,12 @@ impl Lwpr {
     /// # Errors
     /// As [`Learner::update`].
     pub fn learn(&mut self, x: &[f64], y: &[f64], weight: f64) -> Result<Update<'_>, Refusal> {
-        self.admit(x, y, weight)?;
-        self.samples += 1;
         let Self { settings, submodels, workshop: shop, .. } = self;
+        shop.sample.admit((x, &settings.norm_in), (y, &settings.norm_out), weight)?;
+        self.samples += 1;
         for (k, submodel) in submodels.iter_mut().enumerate() {
-            let (voices, change) = submodel.learn(shop.y[k], weight, (shop, settings));
+            let y = shop.sample.y[k];
+            let (voices, change) = submodel.learn(y, weight, (shop, settings));
             shop.output[k] = voices.prediction(settings.norm_out[k], settings);
             shop.changes[k] = change;
         }
@@ -184,46 +167,23 @@ impl Lwpr {
     ) {
         let outputs = y.iter_mut().zip(conf).zip(max_w).zip(&self.settings.norm_out);
         for (k, (((y, conf), max_w), norm)) in outputs.enumerate() {
-            let voices = self.hear(k, x);
+            let voices = self.hear(k, x, true);
             *y = voices.prediction(*norm, &self.settings);
             *conf = voices.deviation(*norm);
             *max_w = voices.max_activation;
         }
     }
 
-    /// What the fields of `output` say about the raw `x`.
-    fn hear(&self, output: usize, x: &[f64]) -> Voices {
+    /// What the fields of `output` say about the raw `x`, about the variance too if it is
+    /// wanted.
+    fn hear(&self, output: usize, x: &[f64], variance: bool) -> Voices {
         let mut room = [0.0; MAX_INPUTS];
         let scaled = &mut room[..self.settings.inputs];
         if x.len() != scaled.len() {
             return Voices::default();
         }
         divide(scaled, x, &self.settings.norm_in);
-        let rules = (self.workshop.size, self.workshop.window);
-        self.submodels[output].consult(scaled, rules, self.settings.cutoff)
-    }
-
-    /// Checks a sample and normalises it into the workshop.
-    fn admit(&mut self, x: &[f64], y: &[f64], weight: f64) -> Result<(), Refusal> {
-        for (given, wanted) in [(x.len(), self.settings.inputs), (y.len(), self.settings.outputs)] {
-            if given != wanted {
-                return Err(Refusal::Length { wanted, given });
-            }
-        }
-        if !weight.is_finite() || !x.iter().chain(y).all(|value| value.is_finite()) {
-            return Err(Refusal::NotFinite);
-        }
-        if weight < 0.0 {
-            return Err(Refusal::NegativeWeight);
-        }
-        let shop = &mut self.workshop;
-        divide(&mut shop.x, x, &self.settings.norm_in);
-        divide(&mut shop.y, y, &self.settings.norm_out);
-        if shop.x.iter().chain(&shop.y).all(|value| value.is_finite()) {
-            Ok(())
-        } else {
-            Err(Refusal::NotFinite)
-        }
+        self.submodels[output].consult(scaled, &self.workshop, variance)
     }
 }
 
@@ -247,7 +207,7 @@ impl Learner for Lwpr {
         }
         let mut largest: f64 = 0.0;
         for (k, (y, norm)) in y.iter_mut().zip(&self.settings.norm_out).enumerate() {
-            let voices = self.hear(k, x);
+            let voices = self.hear(k, x, false);
             *y = voices.prediction(*norm, &self.settings);
             largest = largest.max(voices.max_activation);
         }
@@ -256,7 +216,14 @@ impl Learner for Lwpr {
 
     /// Of all outputs together.
     fn fields(&self) -> usize {
-        self.submodels.iter().map(|submodel| submodel.fields().len()).sum()
+        self.submodels.iter().map(Submodel::len).sum()
+    }
+}
+
+impl From<Lwpr> for Stored {
+    fn from(lwpr: Lwpr) -> Self {
+        let Lwpr { settings, samples, submodels, .. } = lwpr;
+        Self { settings, samples, submodels: submodels.iter().map(Submodel::store).collect() }
     }
 }
 
@@ -270,7 +237,8 @@ impl TryFrom<Stored> for Lwpr {
         if given != wanted {
             return Err(BuildError::Length { key: "submodels", given, wanted });
         }
-        submodels.iter().try_for_each(|submodel| submodel.check(&settings))?;
+        let restore = |stored| Submodel::restore(stored, &settings, &workshop);
+        let submodels = submodels.into_iter().map(restore).collect::<Result<_, _>>()?;
         Ok(Self { settings, samples, submodels, workshop })
     }
 }
@@ -278,9 +246,8 @@ impl TryFrom<Stored> for Lwpr {
 impl Voices {
     /// The prediction in raw units, within the limit and always finite.
     fn prediction(&self, norm: f64, settings: &Settings) -> f64 {
-        let limit = settings.output_limit.unwrap_or(f64::MAX);
         let mean = if self.sum_w > 0.0 { self.sum_wy / self.sum_w * norm } else { 0.0 };
-        if mean.is_nan() { 0.0 } else { mean.clamp(-limit, limit) }
+        settled(mean, settings.output_limit)
     }
 
     /// Its standard deviation in raw units, always finite.
@@ -288,11 +255,5 @@ impl Voices {
         let scatter = self.sum_wy2 - self.sum_wy * self.sum_wy / self.sum_w;
         let deviation = norm * (scatter.abs().sqrt() / self.sum_w);
         if self.sum_w > 0.0 && deviation.is_finite() { deviation } else { UNKNOWN * norm }
-    }
-}
-
-fn divide(into: &mut [f64], values: &[f64], norms: &[f64]) {
-    for ((into, value), norm) in into.iter_mut().zip(values).zip(norms) {
-        *into = value / norm;
     }
 }

@@ -1,29 +1,29 @@
-//! The shape of a receptive field, learned by gradient descent.
+//! The distance metric D of a receptive field, and how it is learned.
 //!
-//! The metric is kept as `D = MᵀM` with M upper triangular, so that D stays positive
-//! whatever the steps on M are. The cost of a field is `J = J₁ + J₂`: the mean squared
-//! leave-one-out error within the field, and γ Σ D², which keeps fields from shrinking to
-//! nothing. A step follows
+//! D = MᵀM with an upper triangular M stays positive whatever M is. M descends the gradient
+//! of the field's cost J = J₁ + J₂ with one learning rate per entry; with meta learning the
+//! rates themselves follow their own gradient (incremental delta-bar-delta).
 //!
-//! G = J₁′ ∂w/∂M / outputs + (w/W) ∂J₂/∂M,  M ← M − α T G
-//!
-//! with one learning rate α per entry of M, which may be learned in turn (meta = true;
-//! the incremental delta-bar-delta of Sutton 1992, with second derivatives).
+//! Of a matrix only what is on and above its diagonal is kept, by rows; of a diagonal one,
+//! its diagonal.
 
+use fearless_simd::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::all_finite;
 use super::kernel::Activation;
+use super::lanes::{Cut, Lanes, Mask, Row, all, dot, exp, finite, multiply};
+use super::records::padded;
+use super::sample::all_finite;
+use super::shapes::{entry, on_diagonal};
 
-/// No step on an entry of M is larger than this share of the largest entry.
+/// A step larger than this share of M's largest entry is held back.
 const LARGEST_STEP: f64 = 0.1;
-/// The log of a rate changes by at most this in one step,
+/// The largest change of the logarithm of a learning rate.
 const LARGEST_RATE_CHANGE: f64 = 0.1;
-/// and stays within ± this.
+/// The logarithm of a learning rate stays within ± this.
 const LOG_RATE_LIMIT: f64 = 10.0;
 
-/// The factor M of a field's metric with its learning rates. All vectors hold n numbers (the
-/// diagonal) or n × n, row by row, of which those below the diagonal do not matter.
+/// What one field learns its metric with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Metric {
@@ -38,28 +38,29 @@ pub struct Metric {
 }
 
 /// How a sample changes the cost of a field.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cost {
+#[derive(Clone, Copy, Debug)]
+pub struct Cost<S: Simd> {
     /// J₁′: the derivative of the error part of the cost with respect to w, per output.
-    pub j1_slope: f64,
+    pub j1_slope: Lanes<S>,
     /// J₁″, per output; used by meta learning only.
-    pub j1_curvature: f64,
+    pub j1_curvature: Lanes<S>,
     /// w/W, the sample's share in the field.
-    pub share: f64,
+    pub share: Lanes<S>,
     /// T: how far the field's regression is to be believed.
-    pub transient: f64,
+    pub transient: Lanes<S>,
 }
 
-/// What one sample says about a field's shape.
-pub struct Descent<'a> {
-    /// x − c.
-    pub offset: &'a [f64],
-    /// The metric D before the step.
-    pub d: &'a [f64],
-    /// The sample's weighted activation and its derivatives.
-    pub activation: Activation,
-    /// What the regression thinks of it.
-    pub cost: Cost,
+/// What one sample says about the shapes of eight fields.
+#[derive(Clone, Copy)]
+pub struct Descent<'a, S: Simd> {
+    /// x − c, normalised.
+    pub offset: &'a [Row],
+    /// The metrics D before the step.
+    pub d: &'a [Row],
+    /// The sample's weighted activations and their derivatives.
+    pub activation: Activation<S>,
+    /// What the regressions think of it.
+    pub cost: Cost<S>,
 }
 
 /// The rules of descent that hold for all fields.
@@ -85,15 +86,6 @@ pub enum Oversized {
     Skipped,
 }
 
-/// The derivatives of w and J₂ with respect to one entry of M.
-#[derive(Clone, Copy)]
-struct Derivatives {
-    w: f64,
-    w_second: f64,
-    j2: f64,
-    j2_second: f64,
-}
-
 impl Metric {
     /// A field's start: M, one rate for all entries.
     pub fn new(m: Vec<f64>, alpha: f64) -> Self {
@@ -108,143 +100,274 @@ impl Metric {
         Self { m, alpha, log_alpha, trace }
     }
 
+    /// The metric with so many entries of these numbers, as many as [`height`] says.
+    pub fn from_column(entries: usize, numbers: &[f64]) -> Self {
+        let MetricRows { m, alpha, log_alpha, trace } = cut(entries, numbers);
+        let [m, alpha, log_alpha, trace] = [m, alpha, log_alpha, trace].map(<[f64]>::to_vec);
+        Self { m, alpha, log_alpha, trace }
+    }
+
+    /// The numbers of which [`from_column`](Self::from_column) makes this metric.
+    pub fn to_column(&self) -> Vec<f64> {
+        let half = height(self.m.len()) / 2;
+        let mut numbers = [&self.m[..], &self.alpha].concat();
+        numbers.resize(half, 0.0);
+        numbers.extend(self.log_alpha.iter().chain(&self.trace));
+        numbers.resize(2 * half, 0.0);
+        numbers
+    }
+
     /// Whether all vectors have `entries` finite numbers.
-    #[inline(always)]
     pub fn is_sound(&self, entries: usize) -> bool {
-        let sound = |values: &[f64]| values.len() == entries && all_finite(&values[..entries]);
+        let sound = |values: &[f64]| values.len() == entries && all_finite(values);
         sound(&self.m) && sound(&self.alpha) && sound(&self.log_alpha) && sound(&self.trace)
     }
+}
 
-    /// Takes one step from `self` to `next`, and writes its D to `d_next`. The number of
-    /// inputs n is that of `by`.
+/// The rows of metrics, to be read or written.
+struct MetricRows<T> {
+    m: T,
+    alpha: T,
+    log_alpha: T,
+    trace: T,
+}
+
+/// How many numbers a metric of so many entries has: M and α, filled up to whole chunks, and
+/// β and the trace likewise.
+pub const fn height(entries: usize) -> usize {
+    2 * padded(2 * entries)
+}
+
+#[inline(always)]
+fn cut<T: Cut>(entries: usize, rows: T) -> MetricRows<T> {
+    let (shape, rates) = rows.cut(padded(2 * entries));
+    let (m, rest) = shape.cut(entries);
+    let (alpha, _) = rest.cut(entries);
+    let (log_alpha, rest) = rates.cut(entries);
+    let (trace, _) = rest.cut(entries);
+    MetricRows { m, alpha, log_alpha, trace }
+}
+
+impl Rules {
+    /// How many numbers of a metric of so many entries, from the first on, a step may change.
     #[inline(always)]
-    pub fn descend(&self, next: &mut Self, d_next: &mut [f64], by: &Descent<'_>, rules: &Rules) {
-        let n = by.offset.len();
-        let limit = LARGEST_STEP * self.m.iter().fold(0.0, |most: f64, m| most.max(m.abs()));
-        if self.m.len() == n {
-            for (a, d) in d_next[..n].iter_mut().enumerate() {
-                let derivatives = self.along_diagonal(a, by, rules.gamma);
-                self.step(next, a, derivatives, by, (limit, rules));
-                bound(&mut next.m[a], true, rules);
-                *d = next.m[a] * next.m[a];
-            }
-            return;
-        }
-        for a in 0..n {
-            let row = &self.m[a * n..][..n];
-            let mut reach = 0.0;
-            let mut square = 0.0;
-            for (offset, m) in by.offset[a..].iter().zip(&row[a..]) {
-                reach += offset * m;
-                square += m * m;
-            }
-            for b in a..n {
-                let derivatives = self.along_entry((a, b), (reach, square), by, rules.gamma);
-                self.step(next, a * n + b, derivatives, by, (limit, rules));
-                bound(&mut next.m[a * n + b], a == b, rules);
-            }
-        }
-        gram(&next.m, d_next, n);
+    pub fn learned(&self, entries: usize) -> usize {
+        if self.meta_rate.is_some() { height(entries) } else { height(entries) / 2 }
     }
 
+    /// Takes one step: writes what comes after the metrics `old` into `next`, as far as
+    /// [`learned`](Self::learned), and its D into `d`. Returns where all is sound: finite,
+    /// with a positive diagonal of D.
     #[inline(always)]
-    fn along_diagonal(&self, a: usize, by: &Descent<'_>, gamma: f64) -> Derivatives {
-        let (m, d, offset) = (self.m[a], by.d[a], by.offset[a]);
-        let q = 2.0 * m * offset * offset;
-        Derivatives {
-            w: by.activation.slope * q,
-            w_second: by.activation.curvature * q * q + 2.0 * by.activation.slope * offset * offset,
-            j2: 4.0 * gamma * d * m,
-            j2_second: 4.0 * gamma * (d + 2.0 * m * m),
-        }
-    }
-
-    /// The derivatives along `M_ab`, given `Σ_{i≥a} d_i M_ai` and `Σ_{i≥a} M_ai²`.
-    #[inline(always)]
-    fn along_entry(
+    pub fn descend<S: Simd>(
         &self,
-        (a, b): (usize, usize),
-        (reach, square): (f64, f64),
-        by: &Descent<'_>,
-        gamma: f64,
-    ) -> Derivatives {
-        let n = by.offset.len();
-        let offset = by.offset[b];
-        let m = self.m[a * n + b];
-        let q = 2.0 * offset * reach;
-        let mut spread = 0.0;
-        for i in a..n {
-            spread += by.d[i * n + b] * self.m[a * n + i];
-        }
-        Derivatives {
-            w: by.activation.slope * q,
-            w_second: by.activation.curvature * q * q + 2.0 * by.activation.slope * offset * offset,
-            j2: 4.0 * gamma * spread,
-            j2_second: 4.0 * gamma * (by.d[b * n + b] + square + m * m),
-        }
-    }
-
-    #[inline(always)]
-    fn step(
-        &self,
-        next: &mut Self,
-        at: usize,
-        along: Derivatives,
-        by: &Descent<'_>,
-        (limit, rules): (f64, &Rules),
-    ) {
-        let Cost { j1_slope, j1_curvature, share, transient } = by.cost;
-        let gradient = j1_slope * along.w + share * along.j2;
-        if let Some(rate) = rules.meta_rate {
-            let change = rate * transient * gradient * self.trace[at];
-            let log_alpha =
-                self.log_alpha[at] - change.clamp(-LARGEST_RATE_CHANGE, LARGEST_RATE_CHANGE);
-            let log_alpha = log_alpha.clamp(-LOG_RATE_LIMIT, LOG_RATE_LIMIT);
-            let alpha = log_alpha.exp();
-            let curvature = along.w_second * j1_slope
-                + along.w * along.w * j1_curvature
-                + share * along.j2_second;
-            let kept = (1.0 - alpha * curvature * transient).max(0.0);
-            next.trace[at] = self.trace[at] * kept - alpha * transient * gradient;
-            next.log_alpha[at] = log_alpha;
-            next.alpha[at] = alpha;
+        simd: S,
+        (old, next): (&[Row], &mut [Row]),
+        d: &mut [Row],
+        by: &Descent<'_, S>,
+    ) -> Mask<S> {
+        let (n, entries) = (by.offset.len(), by.d.len());
+        let before = cut(entries, old);
+        let mut after = cut(entries, &mut *next);
+        let slopes = Slopes { simd, by, gamma: 4.0 * self.gamma };
+        // The slopes wait where M will be, and the curvatures where the traces will be.
+        let out = (&mut *after.m, &mut *after.trace);
+        if entries == n {
+            slopes.along_diagonal(before.m, out);
         } else {
-            next.alpha[at] = self.alpha[at];
-            next.log_alpha[at] = self.log_alpha[at];
-            next.trace[at] = self.trace[at];
+            slopes.along_triangle(before.m, out);
         }
-        let mut step = next.alpha[at] * transient * gradient;
-        // Signed, as published: only steps that widen the field are held back.
-        if step > limit {
-            next.alpha[at] /= 2.0;
-            step = match rules.oversized {
-                Oversized::Halved => step / 2.0,
-                Oversized::Skipped => 0.0,
-            };
+        self.step(simd, &before, &mut after, by.cost.transient);
+        if let Some(bounds) = self.bounds {
+            hold(simd, after.m, n, bounds);
         }
-        next.m[at] = self.m[at] - step;
+        if entries == n {
+            square(simd, after.m, d);
+        } else {
+            gram(simd, after.m, d, n);
+        }
+        let mut sound = finite(simd, &next[..self.learned(entries)]) & finite(simd, d);
+        for a in 0..n {
+            let d = d[on_diagonal(n, entries, a)].get(simd);
+            sound &= d.simd_ge(f64::MIN_POSITIVE);
+        }
+        sound
+    }
+
+    /// Steps along all entries.
+    #[inline(always)]
+    fn step<S: Simd>(
+        &self,
+        simd: S,
+        old: &MetricRows<&[Row]>,
+        next: &mut MetricRows<&mut [Row]>,
+        transient: Lanes<S>,
+    ) {
+        if let Some(rate) = self.meta_rate {
+            learn_rates(simd, old, next, (transient, transient * rate));
+        } else {
+            next.alpha.copy_from_slice(old.alpha);
+        }
+        let mut limit = all(simd, 0.0);
+        for m in old.m {
+            limit = limit.max(m.get(simd).abs());
+        }
+        limit *= LARGEST_STEP;
+        let taken = match self.oversized {
+            Oversized::Halved => 0.5,
+            Oversized::Skipped => 0.0,
+        };
+        for ((m, alpha), old) in next.m.iter_mut().zip(&mut *next.alpha).zip(old.m) {
+            let rate = alpha.get(simd);
+            let step = rate * (m.get(simd) * transient);
+            // Signed, as published: only steps that widen the field are held back.
+            let too_large = step.simd_gt(limit);
+            alpha.set(too_large.select(rate * 0.5, rate));
+            m.set(old.get(simd) - too_large.select(step * taken, step));
+        }
     }
 }
 
-/// Keeps an entry of M within the bounds, if there are any.
+/// Moves the learning rates and the traces. Loops of their own, each without a chain from one
+/// entry to the next, let the processor be at several entries at a time.
 #[inline(always)]
-fn bound(m: &mut f64, on_diagonal: bool, rules: &Rules) {
-    if let Some((least, most)) = rules.bounds {
-        *m = m.clamp(if on_diagonal { least } else { -most }, most);
+fn learn_rates<S: Simd>(
+    simd: S,
+    old: &MetricRows<&[Row]>,
+    next: &mut MetricRows<&mut [Row]>,
+    (transient, rate): (Lanes<S>, Lanes<S>),
+) {
+    let before = next.m.iter().zip(old.trace).zip(old.log_alpha);
+    for (log_alpha, ((slope, trace), old)) in next.log_alpha.iter_mut().zip(before) {
+        let limit = LARGEST_RATE_CHANGE;
+        let change = clamp(rate * slope.get(simd) * trace.get(simd), -limit, limit);
+        log_alpha.set(clamp(old.get(simd) - change, -LOG_RATE_LIMIT, LOG_RATE_LIMIT));
+    }
+    for (alpha, log_alpha) in next.alpha.iter_mut().zip(&*next.log_alpha) {
+        alpha.set(exp(log_alpha.get(simd)));
+    }
+    let by = next.m.iter().zip(&*next.alpha).zip(old.trace);
+    for (trace, ((slope, alpha), old)) in next.trace.iter_mut().zip(by) {
+        let (alpha, curvature) = (alpha.get(simd), trace.get(simd));
+        let kept = all(simd, 1.0) - alpha * curvature * transient;
+        let kept = kept.simd_gt(0.0).select(kept, all(simd, 0.0));
+        trace.set(old.get(simd) * kept - alpha * (slope.get(simd) * transient));
     }
 }
 
-/// `D = MᵀM` of an upper triangular M.
-#[inline(always)]
-pub fn gram(m: &[f64], d: &mut [f64], n: usize) {
-    for a in 0..n {
-        for b in a..n {
-            let mut sum = 0.0;
-            for i in 0..=a {
-                sum += m[i * n + a] * m[i * n + b];
+/// The derivatives of the cost with respect to the entries of M.
+struct Slopes<'a, S: Simd> {
+    simd: S,
+    by: &'a Descent<'a, S>,
+    /// Four times the penalty.
+    gamma: f64,
+}
+
+impl<S: Simd> Slopes<'_, S> {
+    /// The first and second derivative with respect to an entry, from the derivatives of q
+    /// and J₂.
+    #[inline(always)]
+    fn of_cost(
+        &self,
+        (q, offset): (Lanes<S>, Lanes<S>),
+        (j2, j2_second): (Lanes<S>, Lanes<S>),
+    ) -> (Lanes<S>, Lanes<S>) {
+        let Activation { slope, curvature, .. } = self.by.activation;
+        let Cost { j1_slope, j1_curvature, share, .. } = self.by.cost;
+        let w = slope * q;
+        let w_second = curvature * q * q + slope * 2.0 * offset * offset;
+        (
+            j1_slope * w + share * (j2 * self.gamma),
+            w_second * j1_slope + w * w * j1_curvature + share * (j2_second * self.gamma),
+        )
+    }
+
+    #[inline(always)]
+    fn along_diagonal(&self, m: &[Row], (slopes, curvatures): (&mut [Row], &mut [Row])) {
+        let simd = self.simd;
+        let by = m.iter().zip(self.by.offset).zip(self.by.d);
+        for ((slope, curvature), ((m, offset), d)) in slopes.iter_mut().zip(curvatures).zip(by) {
+            let (m, offset, d) = (m.get(simd), offset.get(simd), d.get(simd));
+            let q = m * 2.0 * offset * offset;
+            let (first, second) = self.of_cost((q, offset), (d * m, d + m * m * 2.0));
+            slope.set(first);
+            curvature.set(second);
+        }
+    }
+
+    /// Along the entries of a full M, row by row.
+    #[inline(always)]
+    fn along_triangle(&self, m: &[Row], (slopes, curvatures): (&mut [Row], &mut [Row])) {
+        let simd = self.simd;
+        let (mut m_rest, mut d_rest, mut offsets) = (m, self.by.d, self.by.offset);
+        let (mut slopes, mut curvatures) = (slopes, curvatures);
+        while let n @ 1.. = offsets.len() {
+            let (m, m_below) = m_rest.split_at(n);
+            let (slope, slopes_below) = slopes.split_at_mut(n);
+            let (curvature, curvatures_below) = curvatures.split_at_mut(n);
+            let (reach, square) = (dot(simd, m, offsets), dot(simd, m, m));
+            // Σ_{i≥a} D_ib M_ai, for every b: row a of M times what D is from a on.
+            multiply(simd, slope, d_rest, m);
+            for (b, ((slope, curvature), (m, offset))) in
+                slope.iter_mut().zip(curvature).zip(m.iter().zip(offsets)).enumerate()
+            {
+                let (m, offset) = (m.get(simd), offset.get(simd));
+                let d = d_rest[entry(n, b, b)].get(simd);
+                let q = offset * 2.0 * reach;
+                let j2 = (slope.get(simd), d + square + m * m);
+                let (first, second) = self.of_cost((q, offset), j2);
+                slope.set(first);
+                curvature.set(second);
             }
-            d[a * n + b] = sum;
-            d[b * n + a] = sum;
+            (m_rest, d_rest, offsets) = (m_below, &d_rest[n..], &offsets[1..]);
+            (slopes, curvatures) = (slopes_below, curvatures_below);
         }
+    }
+}
+
+/// Keeps M's diagonal within the bounds, and the other entries within ± the larger one.
+#[inline(always)]
+fn hold<S: Simd>(simd: S, m: &mut [Row], n: usize, (least, most): (f64, f64)) {
+    for m in &mut *m {
+        m.set(clamp(m.get(simd), -most, most));
+    }
+    for a in 0..n {
+        let m = &mut m[on_diagonal(n, m.len(), a)];
+        m.set(clamp(m.get(simd), least, most));
+    }
+}
+
+/// From `least` to `most`; what is not a number stays so.
+#[inline(always)]
+fn clamp<S: Simd>(lanes: Lanes<S>, least: f64, most: f64) -> Lanes<S> {
+    let (low, high) = (lanes.simd_lt(least), lanes.simd_gt(most));
+    low.select(all(lanes.simd, least), high.select(all(lanes.simd, most), lanes))
+}
+
+/// `D = M²` of diagonal M.
+#[inline(always)]
+fn square<S: Simd>(simd: S, m: &[Row], d: &mut [Row]) {
+    for (d, m) in d.iter_mut().zip(m) {
+        d.set(m.get(simd) * m.get(simd));
+    }
+}
+
+/// `D = MᵀM` of upper triangular M: the sum over its rows of what each is times itself.
+#[inline(always)]
+fn gram<S: Simd>(simd: S, m: &[Row], d: &mut [Row], n: usize) {
+    d.fill(Row::ZERO);
+    let (mut m_rest, mut d_rest) = (m, d);
+    for length in (1..=n).rev() {
+        let (m, m_below) = m_rest.split_at(length);
+        let mut squares = &mut *d_rest;
+        for (a, left) in m.iter().enumerate() {
+            let (square, below) = squares.split_at_mut(length - a);
+            let left = left.get(simd);
+            for (d, right) in square.iter_mut().zip(&m[a..]) {
+                d.set(d.get(simd) + left * right.get(simd));
+            }
+            squares = below;
+        }
+        (m_rest, d_rest) = (m_below, &mut d_rest[length..]);
     }
 }

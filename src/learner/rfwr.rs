@@ -41,7 +41,9 @@
 //! field computes its next state aside and keeps it only if every number is finite and D
 //! is positive; otherwise the field drops that sample, or that step of its metric.
 
+mod errors;
 mod field;
+mod regression;
 mod settings;
 mod workshop;
 
@@ -50,33 +52,34 @@ use serde::{Deserialize, Serialize};
 pub use field::{Errors, Field, Regression};
 pub use settings::Settings;
 
+pub use super::growth::Growth;
 pub use super::settings::{InitialMetric, MAX_INPUTS};
 
+use super::growth::Wish;
+use super::lanes::run;
 use super::metric::Metric;
-use super::shapes::{Nearest, Shapes, Size, distance};
-use super::{BuildError, Learner, Refusal, all_finite};
-use field::Findings;
-use workshop::Workshop;
-
-/// A new field takes after the nearest one if that is activated by more than this share of
-/// `w_gen`.
-const KINSHIP: f64 = 0.1;
+use super::sample::{divide, settled};
+use super::near::Near;
+use super::shapes::Shapes;
+use super::store::Store;
+use super::{BuildError, Learner, Refusal};
+use workshop::{Consult, Teach, Workshop};
 
 /// The learner.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(try_from = "Stored")]
+#[serde(try_from = "Stored", into = "Stored")]
 pub struct Rfwr {
     settings: Settings,
     samples: u64,
     pruned: u64,
     shapes: Shapes,
-    fields: Vec<Field>,
-    #[serde(skip_serializing)]
+    /// All that fields know, in the order of [`Field::to_column`].
+    fields: Store,
     workshop: Workshop,
 }
 
-/// A learner as read from a file, before it is checked.
-#[derive(Deserialize)]
+/// A learner as in a file.
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Stored {
     settings: Settings,
@@ -100,27 +103,6 @@ pub struct Update<'a> {
     pub growth: Growth,
 }
 
-/// How an update changed the set of fields.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Growth {
-    /// Not at all.
-    None,
-    /// A field was appended.
-    Added {
-        /// Its index.
-        field: usize,
-        /// The field whose metric, rates and offset it took over.
-        template: Option<usize>,
-    },
-    /// A field was removed; the later ones moved down.
-    Pruned {
-        /// Its index before.
-        field: usize,
-        /// The overlapping field that stays, by its index before.
-        survivor: usize,
-    },
-}
-
 impl Rfwr {
     /// A learner that knows nothing.
     ///
@@ -129,7 +111,8 @@ impl Rfwr {
     pub fn new(settings: Settings) -> Result<Self, BuildError> {
         let workshop = Workshop::new(&settings)?;
         let shapes = Shapes::new(settings.inputs, settings.diag_only);
-        Ok(Self { settings, samples: 0, pruned: 0, shapes, fields: Vec::new(), workshop })
+        let fields = Store::new(settings.inputs, workshop.blank(&settings));
+        Ok(Self { settings, samples: 0, pruned: 0, shapes, fields, workshop })
     }
 
     /// The settings.
@@ -148,18 +131,22 @@ impl Rfwr {
     }
 
     /// The centre of `field`, in normalised coordinates.
-    pub fn centre(&self, field: usize) -> &[f64] {
+    pub fn centre(&self, field: usize) -> Vec<f64> {
         self.shapes.centre(field)
     }
 
     /// The metric D of `field`, normalised: its diagonal (`diag_only`) or n × n by rows.
-    pub fn metric(&self, field: usize) -> &[f64] {
+    pub fn metric(&self, field: usize) -> Vec<f64> {
         self.shapes.metric(field)
     }
 
     /// The fields, in storage order.
-    pub fn field_states(&self) -> &[Field] {
-        &self.fields
+    pub fn field_states(&self) -> Vec<Field> {
+        (0..self.fields()).map(|field| self.state(field)).collect()
+    }
+
+    fn state(&self, field: usize) -> Field {
+        Field::from_column(self.workshop.size, &self.fields.column(field))
     }
 
     /// Learns a sample (see [`Learner::update`]) and says what came of it.
@@ -167,183 +154,53 @@ impl Rfwr {
     /// # Errors
     /// As [`Learner::update`].
     pub fn learn(&mut self, x: &[f64], y: &[f64], weight: f64) -> Result<Update<'_>, Refusal> {
-        self.admit(x, y, weight)?;
+        let Self { settings, shapes, fields, workshop: shop, .. } = self;
+        shop.sample.admit((x, &settings.norm_in), (y, &settings.norm_out), weight)?;
         self.samples += 1;
-        let nearest = match (x.len(), y.len()) {
-            (1, 1) => self.teach_with((1, 1), weight),
-            (2, 1) => self.teach_with((2, 1), weight),
-            (3, 1) => self.teach_with((3, 1), weight),
-            (4, 1) => self.teach_with((4, 1), weight),
-            (5, 1) => self.teach_with((5, 1), weight),
-            (6, 1) => self.teach_with((6, 1), weight),
-            size => self.teach_with(size, weight),
-        };
-        let strongest = |near: Option<(usize, f64)>| {
-            let (index, w) = near.map(|(index, q)| (index, self.workshop.window.activation(q)))?;
-            (w > 0.0).then_some((index, w))
-        };
-        let (first, second) = (strongest(nearest.first), strongest(nearest.second));
-        let growth = self.grow(first, second, y);
+        let level = shop.level;
+        let taught = run(level, Teach { settings, shapes, fields, shop, weight });
+        settle(&mut shop.blend, taught.voices, settings);
+        let growth = self.grow(taught.strongest, y);
+        let activation = |near: Near| near.map_or(0.0, |(_, w)| w);
         Ok(Update {
             output: &self.workshop.blend,
-            max_activation: first.map_or(0.0, |(_, w)| w),
-            second_activation: second.map_or(0.0, |(_, w)| w),
+            max_activation: activation(taught.strongest[0]),
+            second_activation: activation(taught.strongest[1]),
             growth,
         })
     }
 
-    /// [`teach`](Self::teach) for constant numbers of inputs and outputs, which makes all
-    /// sizes in it constant.
-    #[inline(always)]
-    fn teach_with(&mut self, (inputs, outputs): (usize, usize), weight: f64) -> Nearest {
-        if self.settings.diag_only {
-            self.teach(Size { inputs, outputs, entries: inputs }, weight)
-        } else {
-            self.teach(Size { inputs, outputs, entries: inputs * inputs }, weight)
-        }
-    }
-
-    /// Lets every active field learn the sample in the workshop, blends their predictions
-    /// of it, and finds the two nearest fields.
-    #[inline(always)]
-    fn teach(&mut self, size: Size, weight: f64) -> Nearest {
-        let shop = &mut self.workshop;
-        shop.blend.fill(0.0);
-        let mut nearest = Nearest::NONE;
-        let mut voices = 0.0;
-        let mut found = Findings::NONE;
-        for (index, field) in self.fields.iter_mut().enumerate() {
-            let (centre, d) = self.shapes.place(index, size);
-            let q = distance(centre, d, &shop.x[..size.inputs]);
-            nearest.note(index, q);
-            if !shop.window.may_count(q) {
-                continue;
-            }
-            let w = shop.window.activation(q);
-            if w <= self.settings.cutoff {
-                continue;
-            }
-            let activation = shop.window.derivatives(w).times(weight);
-            shop.teach(field, (centre, d), (size, activation, &mut found), &self.settings);
-            let said = &found.y[..size.outputs];
-            if field.regression.trustworthy && all_finite(said) {
-                voices += w;
-                for (sum, y) in shop.blend.iter_mut().zip(said) {
-                    *sum += w * y;
-                }
-            }
-        }
-        settle(&mut shop.blend, voices, &self.settings);
-        nearest
-    }
-
-    /// [`consult`](Self::consult) for constant numbers of inputs and outputs.
-    #[inline(always)]
-    fn consult_with(&self, (inputs, outputs): (usize, usize), x: &[f64], y: &mut [f64]) -> f64 {
-        if self.settings.diag_only {
-            self.consult(Size { inputs, outputs, entries: inputs }, x, y)
-        } else {
-            self.consult(Size { inputs, outputs, entries: inputs * inputs }, x, y)
-        }
-    }
-
-    /// Predicts at the normalised `x`, see [`Learner::predict`].
-    #[inline(always)]
-    fn consult(&self, size: Size, x: &[f64], y: &mut [f64]) -> f64 {
-        let x = &x[..size.inputs];
-        let window = self.workshop.window;
-        let mut nearest = f64::INFINITY;
-        let mut voices = 0.0;
-        for (Field { regression, .. }, (centre, d)) in
-            self.fields.iter().zip(self.shapes.each(size))
-        {
-            let q = distance(centre, d, x);
-            nearest = nearest.min(q);
-            if !window.may_count(q) {
-                continue;
-            }
-            let w = window.activation(q);
-            if w <= self.settings.cutoff || !regression.trustworthy {
-                continue;
-            }
-            voices += w;
-            for (k, sum) in y.iter_mut().enumerate() {
-                *sum += w * regression.predict(size, k, x);
-            }
-        }
-        settle(y, voices, &self.settings);
-        window.activation(nearest)
-    }
-
-    /// Checks a sample and normalises it into the workshop.
-    fn admit(&mut self, x: &[f64], y: &[f64], weight: f64) -> Result<(), Refusal> {
-        for (given, wanted) in [(x.len(), self.settings.inputs), (y.len(), self.settings.outputs)] {
-            if given != wanted {
-                return Err(Refusal::Length { wanted, given });
-            }
-        }
-        if !weight.is_finite() || !x.iter().chain(y).all(|value| value.is_finite()) {
-            return Err(Refusal::NotFinite);
-        }
-        if weight < 0.0 {
-            return Err(Refusal::NegativeWeight);
-        }
-        let shop = &mut self.workshop;
-        divide(&mut shop.x, x, &self.settings.norm_in);
-        divide(&mut shop.y, y, &self.settings.norm_out);
-        if shop.x.iter().chain(&shop.y).all(|value| value.is_finite()) {
-            Ok(())
-        } else {
-            Err(Refusal::NotFinite)
-        }
-    }
-
     /// Adds a field in empty space, or removes one of two that overlap.
-    fn grow(
-        &mut self,
-        first: Option<(usize, f64)>,
-        second: Option<(usize, f64)>,
-        raw_y: &[f64],
-    ) -> Growth {
-        let settings = &self.settings;
-        let full = settings.max_fields.is_some_and(|most| self.fields.len() >= most as usize);
-        match (first, second) {
-            (Some((_, w)), None) if w > settings.w_gen => Growth::None,
-            (Some((_, w)), Some((_, w_second))) if w > settings.w_gen => {
-                if w_second > settings.w_prune { self.prune(first, second) } else { Growth::None }
-            }
-            _ if full => Growth::None,
-            _ => self.add(first, raw_y),
+    fn grow(&mut self, strongest: [Near; 2], raw_y: &[f64]) -> Growth {
+        let trusted = |field: usize| self.state(field).regression.trustworthy;
+        match self.settings.growth().wish(strongest, self.fields(), trusted) {
+            Wish::Stay => Growth::None,
+            Wish::Add(template) => self.add(template, raw_y),
+            Wish::Prune(first, second) => self.prune(first, second),
         }
     }
 
-    fn add(&mut self, strongest: Option<(usize, f64)>, raw_y: &[f64]) -> Growth {
-        let template = strongest
-            .filter(|&(index, w)| {
-                w > KINSHIP * self.settings.w_gen && self.fields[index].regression.trustworthy
-            })
-            .map(|(index, _)| index);
+    fn add(&mut self, template: Option<usize>, raw_y: &[f64]) -> Growth {
         let shop = &self.workshop;
         let (offset, metric, d) = if let Some(index) = template {
-            let Field { regression, metric, .. } = &self.fields[index];
-            let metric = Metric::inheriting(metric.m.clone(), metric.alpha.clone());
-            (regression.offset.clone(), metric, self.shapes.metric(index).to_vec())
+            let Field { regression, metric, .. } = self.state(index);
+            let metric = Metric::inheriting(metric.m, metric.alpha);
+            (regression.offset, metric, self.shapes.kept(index))
         } else {
             // As published: the very first field gets the offset before normalisation. Its
             // first sample sets that right.
-            let offset = if self.fields.is_empty() { raw_y } else { &shop.y };
+            let offset = if self.fields() == 0 { raw_y } else { &shop.sample.y };
             (offset.to_vec(), shop.start.clone(), shop.start_d.clone())
         };
-        let field = self.fields.len();
-        self.shapes.push(&shop.x, &d);
-        self.fields.push(Field::new(&self.settings, offset, metric));
+        let field = self.fields();
+        self.shapes.push(&shop.sample.x, &d);
+        self.fields.push(&Field::new(&self.settings, offset, metric).to_column());
         Growth::Added { field, template }
     }
 
     /// Removes the narrower of two fields, as the sum of D's entries says; of equal ones
     /// the one activated more.
-    fn prune(&mut self, first: Option<(usize, f64)>, second: Option<(usize, f64)>) -> Growth {
-        let (Some((first, _)), Some((second, _))) = (first, second) else { return Growth::None };
+    fn prune(&mut self, first: usize, second: usize) -> Growth {
         let narrowness = |field| self.shapes.metric(field).iter().sum::<f64>();
         let (field, survivor) =
             if narrowness(second) > narrowness(first) { (second, first) } else { (first, second) };
@@ -369,26 +226,28 @@ impl Learner for Rfwr {
 
     fn predict(&self, x: &[f64], y: &mut [f64]) -> f64 {
         y.fill(0.0);
-        let Size { inputs, outputs, .. } = self.workshop.size;
-        if x.len() != inputs || y.len() != outputs {
+        let Self { settings, shapes, fields, workshop: shop, .. } = self;
+        if x.len() != settings.inputs || y.len() != settings.outputs {
             return 0.0;
         }
         let mut room = [0.0; MAX_INPUTS];
-        let scaled = &mut room[..inputs];
-        divide(scaled, x, &self.settings.norm_in);
-        match (inputs, outputs) {
-            (1, 1) => self.consult_with((1, 1), scaled, y),
-            (2, 1) => self.consult_with((2, 1), scaled, y),
-            (3, 1) => self.consult_with((3, 1), scaled, y),
-            (4, 1) => self.consult_with((4, 1), scaled, y),
-            (5, 1) => self.consult_with((5, 1), scaled, y),
-            (6, 1) => self.consult_with((6, 1), scaled, y),
-            size => self.consult_with(size, scaled, y),
-        }
+        let x_scaled = &mut room[..x.len()];
+        divide(x_scaled, x, &settings.norm_in);
+        let heard = run(shop.level, Consult { shapes, fields, shop, x: x_scaled, y });
+        settle(y, heard.voices, settings);
+        heard.strongest[0].map_or(0.0, |(_, w)| w)
     }
 
     fn fields(&self) -> usize {
-        self.fields.len()
+        self.fields.fields()
+    }
+}
+
+impl From<Rfwr> for Stored {
+    fn from(rfwr: Rfwr) -> Self {
+        let fields = rfwr.field_states();
+        let Rfwr { settings, samples, pruned, shapes, .. } = rfwr;
+        Self { settings, samples, pruned, shapes, fields }
     }
 }
 
@@ -396,30 +255,24 @@ impl TryFrom<Stored> for Rfwr {
     type Error = BuildError;
 
     fn try_from(stored: Stored) -> Result<Self, BuildError> {
-        let Stored { settings, samples, pruned, shapes, fields } = stored;
-        let workshop = Workshop::new(&settings)?;
-        if !shapes.holds(settings.inputs, settings.diag_only, fields.len()) {
-            return Err(BuildError::Shapes { fields: fields.len() });
+        let Stored { settings, samples, pruned, shapes, fields: stored } = stored;
+        let fresh = Self::new(settings)?;
+        let Self { settings, workshop, mut fields, .. } = fresh;
+        if !shapes.holds(settings.inputs, settings.diag_only, stored.len()) {
+            return Err(BuildError::Shapes { fields: stored.len() });
         }
-        let size = settings.size();
-        if let Some(field) = fields.iter().position(|field| !field.is_sound(size)) {
+        if let Some(field) = stored.iter().position(|field| !field.is_sound(workshop.size)) {
             return Err(BuildError::Field { field });
         }
+        stored.iter().for_each(|field| fields.push(&field.to_column()));
         Ok(Self { settings, samples, pruned, shapes, fields, workshop })
     }
 }
 
-/// Turns weighted sums into a prediction in raw units, within the limit and always finite.
+/// Turns sums of w y into predictions in raw units, within the limit and always finite.
 fn settle(sums: &mut [f64], voices: f64, settings: &Settings) {
-    let limit = settings.output_limit.unwrap_or(f64::MAX);
     for (y, norm) in sums.iter_mut().zip(&settings.norm_out) {
         let mean = if voices > 0.0 { *y / voices * norm } else { 0.0 };
-        *y = if mean.is_nan() { 0.0 } else { mean.clamp(-limit, limit) };
-    }
-}
-
-fn divide(into: &mut [f64], values: &[f64], norms: &[f64]) {
-    for ((into, value), norm) in into.iter_mut().zip(values).zip(norms) {
-        *into = value / norm;
+        *y = settled(mean, settings.output_limit);
     }
 }

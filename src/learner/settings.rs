@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::BuildError;
-use super::shapes::is_positive;
+use super::sample::all_finite;
 
 /// The most inputs a learner takes.
 pub const MAX_INPUTS: usize = 64;
@@ -53,14 +53,39 @@ impl InitialMetric {
         let lower = matrix.clone().cholesky().ok_or(BuildError::NoMetric)?.unpack();
         // nalgebra stores by columns: Mᵀ by columns is M by rows.
         let (d, m) = (matrix.as_slice().to_vec(), lower.as_slice().to_vec());
-        let sound = d.iter().chain(&m).all(|value| value.is_finite());
-        if sound && is_positive(&d, n) { Ok((d, m)) } else { Err(BuildError::NoMetric) }
+        let positive = diagonal(&d, n).iter().all(|&d| d >= f64::MIN_POSITIVE);
+        if positive && all_finite(&d) && all_finite(&m) { Ok((d, m)) } else { Err(BuildError::NoMetric) }
     }
+}
+
+/// D and M of new fields over `n` inputs, each as its diagonal (`diag_only`) or what is on
+/// and above it.
+///
+/// # Errors
+/// When `d` is no metric, or not diagonal where it should be.
+pub fn start(
+    d: &InitialMetric,
+    n: usize,
+    diag_only: bool,
+) -> Result<(Vec<f64>, Vec<f64>), BuildError> {
+    let (d, m) = d.factorise(n)?;
+    if !diag_only {
+        return Ok((upper(&d, n), upper(&m, n)));
+    }
+    if d.iter().filter(|&&d| d != 0.0).count() > n {
+        return Err(BuildError::FullMetric);
+    }
+    Ok((diagonal(&d, n), diagonal(&m, n)))
 }
 
 /// The diagonal of a square matrix over `n` inputs.
 pub fn diagonal(matrix: &[f64], n: usize) -> Vec<f64> {
     matrix.iter().copied().step_by(n + 1).collect()
+}
+
+/// What is on and above the diagonal of a square matrix over `n` inputs, by rows.
+pub fn upper(matrix: &[f64], n: usize) -> Vec<f64> {
+    (0..n).flat_map(|a| &matrix[a * n + a..(a + 1) * n]).copied().collect()
 }
 
 /// Demands that there are 1 to 64 inputs and outputs, with a norm each, from 1e-12 to 1e12.

@@ -1,27 +1,17 @@
-//! One receptive field: its local regression, one projection after the other.
-//!
-//! Everything here is computed in a copy of the state, which the caller keeps only if it is
-//! sound: a sample that would overflow leaves no trace.
+//! One receptive field as it is stored and shown, and where its numbers are.
 
 use serde::{Deserialize, Serialize};
 
 use super::settings::Settings;
-use crate::learner::all_finite;
-use crate::learner::metric::Metric;
-use crate::learner::settings::MAX_INPUTS;
+use crate::learner::lanes::Cut;
+use crate::learner::metric::{self, Metric};
+use crate::learner::records::padded;
+use crate::learner::sample::all_finite;
 
 /// What sums that are divided by start with.
-const NEARLY_NOTHING: f64 = 1e-10;
-/// The direction of a projection turns only to a vector whose square is larger than this.
-const LEAST_SQUARE: f64 = 1e-24;
-/// What [`Projection::ripeness`] must exceed for errors to be counted and shapes learned.
-pub(super) const RIPE: f64 = 0.1;
-/// The same for a projection before the next one is added.
-const RIPE_FOR_NEXT: f64 = 0.5;
-/// A projection has seen as much as the first one when its count is this share of it.
-const AS_MUCH: f64 = 0.99;
+pub const NEARLY_NOTHING: f64 = 1e-10;
 
-/// A field without its centre and metric, which lie with those of the other fields.
+/// A field without its centre and its D, which lie with those of the other fields.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Field {
@@ -32,8 +22,7 @@ pub struct Field {
 }
 
 /// A local linear model, fitted by incremental partial least squares: y ≈ β₀ + Σ βⱼ sⱼ with
-/// `sⱼ = Uⱼ·xⱼ`, `x₁ = x − x̄` and `xⱼ₊₁ = xⱼ − Pⱼ sⱼ`. The vectors of its R projections are
-/// stored one after the other, n numbers each.
+/// `sⱼ = Uⱼ·xⱼ`, `x₁ = x − x̄` and `xⱼ₊₁ = xⱼ − Pⱼ sⱼ`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Regression {
@@ -49,20 +38,12 @@ pub struct Regression {
     pub sum_e2: f64,
     /// The remembered sum of `w² Σ sⱼ²/SSs2ⱼ`, what the fit has cost in degrees of freedom.
     pub ss_p: f64,
-    /// The projections (R).
+    /// The projections (R, from 1 to n).
     pub projections: Vec<Projection>,
-    /// The directions U (R × n), of length 1.
-    pub u: Vec<f64>,
-    /// P (R × n): what of the inputs each projection accounts for.
-    pub p: Vec<f64>,
-    /// The remembered sums of w s x (R × n).
-    pub ss_x_res: Vec<f64>,
-    /// The remembered sums of w x y (R × n), along which U points.
-    pub s_x_res_y_res: Vec<f64>,
 }
 
-/// The numbers of one projection.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// One projection.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Projection {
     /// How many samples it remembers.
@@ -84,72 +65,168 @@ pub struct Projection {
     pub h: f64,
     /// r: how they act on the variance.
     pub r: f64,
+    /// The direction U (n), of length 1.
+    pub u: Vec<f64>,
+    /// P (n): what of the inputs the projection accounts for.
+    pub p: Vec<f64>,
+    /// The remembered sum of w s x (n).
+    pub ss_x_res: Vec<f64>,
+    /// The remembered sum of w x y (n), along which U points.
+    pub s_x_res_y_res: Vec<f64>,
 }
 
-/// A sample as a field sees it, normalised.
-pub struct Sample<'a> {
-    /// The inputs (n).
-    pub x: &'a [f64],
-    /// The output.
-    pub y: f64,
-    /// The field's activation times the sample's weight.
-    pub w: f64,
+/// How many numbers of each kind a field has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// n.
+    pub inputs: usize,
+    /// The numbers of M.
+    pub entries: usize,
 }
 
-/// What the regression found about the sample, for the metric; each field overwrites it.
-#[derive(Clone, Debug)]
-pub struct Findings {
-    /// x₁ to `x_R` (R × n of n × n).
-    residuals: Vec<f64>,
-    /// s, in the end with the new U and P (R of n).
-    pub s: Vec<f64>,
-    /// The errors before learning, of projections 1 to j together (R of n).
-    e_cvs: Vec<f64>,
-    /// H after the sample (R of n), not yet taken over,
-    pub h: Vec<f64>,
-    /// and r.
-    pub r: Vec<f64>,
-    /// y − β₀.
-    yz: f64,
-    /// The error before learning, of the projections that count.
-    pub e_cv: f64,
-    /// Their error after it.
-    pub e: f64,
-    /// The field's prediction of the sample.
-    pub y: f64,
+/// The rows that come before the projections, to be read or written.
+pub struct Base<T> {
+    /// The scalars: [`TRUSTWORTHY`], [`OFFSET`], [`SUM_E2`], [`SS_P`] and [`COUNT`].
+    pub scalars: T,
+    /// x̄ (n).
+    pub mean: T,
+    /// The variance (n).
+    pub var: T,
 }
 
-/// What a field says about an input.
-#[derive(Clone, Copy, Debug)]
-pub struct Opinion {
-    /// The output, normalised.
-    pub y: f64,
-    /// Its variance.
-    pub variance: f64,
+/// The rows of one projection, to be read or written.
+pub struct ProjectionRows<T> {
+    /// The scalars, [`N_DATA`] to [`R`].
+    pub scalars: T,
+    /// U (n).
+    pub u: T,
+    /// P (n).
+    pub p: T,
+    /// Σ w s x (n).
+    pub ss_x_res: T,
+    /// Σ w x y (n).
+    pub s_x_res_y_res: T,
 }
 
-impl Findings {
-    /// Room for `n` inputs.
-    pub fn new(n: usize) -> Self {
-        let room = || vec![0.0; n];
-        Self {
-            residuals: vec![0.0; n * n],
-            s: room(),
-            e_cvs: room(),
-            h: room(),
-            r: room(),
-            yz: 0.0,
-            e_cv: 0.0,
-            e: 0.0,
-            y: 0.0,
-        }
+/// Where 1 says that a field may speak, and 0 that it may not.
+pub const TRUSTWORTHY: usize = 0;
+/// Where β₀ is.
+pub const OFFSET: usize = 1;
+/// Where the sum of squared errors is.
+pub const SUM_E2: usize = 2;
+/// Where `ss_p` is.
+pub const SS_P: usize = 3;
+/// Where the number of projections is.
+pub const COUNT: usize = 4;
+/// How many scalars the base has; x̄ comes after them.
+pub const BASE_SCALARS: usize = 5;
+
+/// Where a projection's count of samples is.
+pub const N_DATA: usize = 0;
+/// Where β is.
+pub const BETA: usize = 1;
+/// Where the sum of weights is.
+pub const SUM_W: usize = 2;
+/// Where the sum of squared errors is.
+pub const SUM_E_CV2: usize = 3;
+/// Where Σ ws² is.
+pub const SS_S2: usize = 4;
+/// Where λ is.
+pub const LAMBDA: usize = 5;
+/// Where Σ wsy is.
+pub const SS_Y_RES: usize = 6;
+/// Where H is.
+pub const H: usize = 7;
+/// Where r is.
+pub const R: usize = 8;
+const PROJECTION_SCALARS: usize = 9;
+
+impl Size {
+    /// The rows of the metric, which come first.
+    pub fn metric(self) -> usize {
+        metric::height(self.entries)
+    }
+
+    /// The rows of the base, which come second.
+    pub fn base(self) -> usize {
+        padded(BASE_SCALARS + 2 * self.inputs)
+    }
+
+    /// As many of them, from the first on, as predictions need.
+    pub fn base_to_predict(self) -> usize {
+        BASE_SCALARS + self.inputs
+    }
+
+    /// The rows of a projection. All projections come last.
+    pub fn projection(self) -> usize {
+        padded(PROJECTION_SCALARS + 4 * self.inputs)
+    }
+
+    /// As many of them, from the first on, as predictions need.
+    pub fn projection_to_predict(self) -> usize {
+        PROJECTION_SCALARS + 2 * self.inputs
+    }
+
+    /// All rows of a field with so many projections.
+    pub fn height(self, projections: usize) -> usize {
+        self.metric() + self.base() + projections * self.projection()
+    }
+
+    /// Where a scalar of a projection is among all rows.
+    pub fn scalar(self, projection: usize, scalar: usize) -> usize {
+        self.height(projection) + scalar
+    }
+
+    /// Where a scalar of the base is among all rows.
+    pub fn base_scalar(self, scalar: usize) -> usize {
+        self.metric() + scalar
+    }
+
+    /// Cuts all rows into those of metric, base and projections.
+    #[inline(always)]
+    pub fn cut<T: Cut>(self, rows: T) -> (T, T, T) {
+        let (metric, rest) = rows.cut(self.metric());
+        let (base, projections) = rest.cut(self.base());
+        (metric, base, projections)
+    }
+
+    /// Cuts the rows of the base.
+    #[inline(always)]
+    pub fn cut_base<T: Cut>(self, rows: T) -> Base<T> {
+        let (scalars, rest) = rows.cut(BASE_SCALARS);
+        let (mean, rest) = rest.cut(self.inputs);
+        let (var, _) = rest.cut(self.inputs);
+        Base { scalars, mean, var }
+    }
+
+    /// Cuts as many rows of a projection as predictions need into scalars, U and P.
+    #[inline(always)]
+    pub fn cut_to_predict<T: Cut>(self, rows: T) -> (T, T, T) {
+        let (scalars, rest) = rows.cut(PROJECTION_SCALARS);
+        let (u, rest) = rest.cut(self.inputs);
+        let (p, _) = rest.cut(self.inputs);
+        (scalars, u, p)
+    }
+
+    /// Cuts the rows of a projection.
+    #[inline(always)]
+    pub fn cut_projection<T: Cut>(self, rows: T) -> ProjectionRows<T> {
+        let (scalars, rest) = rows.cut(PROJECTION_SCALARS);
+        let (u, rest) = rest.cut(self.inputs);
+        let (p, rest) = rest.cut(self.inputs);
+        let (ss_x_res, rest) = rest.cut(self.inputs);
+        let (s_x_res_y_res, _) = rest.cut(self.inputs);
+        ProjectionRows { scalars, u, p, ss_x_res, s_x_res_y_res }
     }
 }
 
 impl Projection {
-    fn new(n_data: f64, settings: &Settings) -> Self {
+    /// A projection at its birth, along `axis`.
+    pub fn new(axis: usize, settings: &Settings) -> Self {
+        let n = settings.inputs;
+        let along: Vec<f64> = (0..n).map(|i| if i == axis { 1.0 } else { 0.0 }).collect();
         Self {
-            n_data,
+            n_data: NEARLY_NOTHING,
             lambda: settings.init_lambda,
             sum_w: NEARLY_NOTHING,
             sum_e_cv2: 0.0,
@@ -158,24 +235,47 @@ impl Projection {
             beta: 0.0,
             h: 0.0,
             r: 0.0,
+            u: along.clone(),
+            p: along,
+            ss_x_res: vec![0.0; n],
+            s_x_res_y_res: vec![0.0; n],
         }
     }
 
-    /// How far the count has come, where 1 is as far as a forgetting factor lets it come.
-    pub(super) fn ripeness(&self, lambda: f64) -> f64 {
-        self.n_data * (1.0 - lambda)
+    fn from_column(n: usize, numbers: &[f64]) -> Self {
+        let (scalars, vectors) = numbers.split_at(PROJECTION_SCALARS);
+        let vector = |k: usize| vectors[k * n..][..n].to_vec();
+        Self {
+            n_data: scalars[N_DATA],
+            lambda: scalars[LAMBDA],
+            sum_w: scalars[SUM_W],
+            sum_e_cv2: scalars[SUM_E_CV2],
+            ss_s2: scalars[SS_S2],
+            ss_y_res: scalars[SS_Y_RES],
+            beta: scalars[BETA],
+            h: scalars[H],
+            r: scalars[R],
+            u: vector(0),
+            p: vector(1),
+            ss_x_res: vector(2),
+            s_x_res_y_res: vector(3),
+        }
     }
 
-    /// The mean squared error before learning.
-    fn mean_e_cv2(&self) -> f64 {
-        self.sum_e_cv2 / self.sum_w + NEARLY_NOTHING
+    /// The numbers of this projection, in the order of its rows.
+    pub fn to_column(&self) -> Vec<f64> {
+        let Self { n_data, lambda, sum_w, sum_e_cv2, ss_s2, ss_y_res, beta, h, r, .. } = *self;
+        let scalars = [n_data, beta, sum_w, sum_e_cv2, ss_s2, lambda, ss_y_res, h, r];
+        let vectors = [&self.u[..], &self.p, &self.ss_x_res, &self.s_x_res_y_res].concat();
+        filled_up([&scalars[..], &vectors].concat())
     }
 
-    fn is_sound(&self) -> bool {
-        let Self { n_data, lambda, sum_w, sum_e_cv2, ss_s2, ss_y_res, beta, h, r } = *self;
-        0.0 < lambda
-            && lambda <= 1.0
-            && all_finite(&[n_data, sum_w, sum_e_cv2, ss_s2, ss_y_res, beta, h, r])
+    fn is_sound(&self, n: usize) -> bool {
+        let vectors = [&self.u, &self.p, &self.ss_x_res, &self.s_x_res_y_res];
+        vectors.into_iter().all(|vector| vector.len() == n)
+            && all_finite(&self.to_column())
+            && 0.0 < self.lambda
+            && self.lambda <= 1.0
     }
 }
 
@@ -183,248 +283,90 @@ impl Regression {
     /// A field's regression at its birth, with `projections` along the axes.
     pub fn new(settings: &Settings, offset: f64, projections: usize) -> Self {
         let n = settings.inputs;
-        let mut blank = Self {
+        Self {
             trustworthy: false,
             offset,
             mean: vec![0.0; n],
             var: vec![0.0; n],
             sum_e2: 0.0,
             ss_p: 0.0,
-            projections: Vec::new(),
-            u: Vec::new(),
-            p: Vec::new(),
-            ss_x_res: Vec::new(),
-            s_x_res_y_res: Vec::new(),
-        };
-        for _ in 0..projections {
-            blank.push(Projection::new(NEARLY_NOTHING, settings));
-        }
-        blank
-    }
-
-    /// Appends a projection along the next axis.
-    fn push(&mut self, projection: Projection) {
-        let (n, axis) = (self.mean.len(), self.projections.len());
-        self.projections.push(projection);
-        for along in [&mut self.u, &mut self.p] {
-            along.extend((0..n).map(|i| if i == axis { 1.0 } else { 0.0 }));
-        }
-        for sums in [&mut self.ss_x_res, &mut self.s_x_res_y_res] {
-            sums.resize((axis + 1) * n, 0.0);
+            projections: (0..projections).map(|axis| Projection::new(axis, settings)).collect(),
         }
     }
 
-    /// Becomes equal to `other`, in place where there is room.
-    pub fn copy(&mut self, other: &Self) {
-        self.trustworthy = other.trustworthy;
-        self.offset = other.offset;
-        self.mean.clone_from(&other.mean);
-        self.var.clone_from(&other.var);
-        self.sum_e2 = other.sum_e2;
-        self.ss_p = other.ss_p;
-        self.projections.clone_from(&other.projections);
-        self.u.clone_from(&other.u);
-        self.p.clone_from(&other.p);
-        self.ss_x_res.clone_from(&other.ss_x_res);
-        self.s_x_res_y_res.clone_from(&other.s_x_res_y_res);
-    }
-
-    /// Whether all lengths fit `n` inputs, every number is finite and every λ is one.
-    pub fn is_sound(&self, n: usize) -> bool {
-        let count = self.projections.len();
-        let fits = |values: &[f64], length| values.len() == length && all_finite(values);
-        (1..=n).contains(&count)
-            && all_finite(&[self.offset, self.sum_e2, self.ss_p])
-            && fits(&self.mean, n)
-            && fits(&self.var, n)
-            && fits(&self.u, count * n)
-            && fits(&self.p, count * n)
-            && fits(&self.ss_x_res, count * n)
-            && fits(&self.s_x_res_y_res, count * n)
-            && self.projections.iter().all(Projection::is_sound)
+    /// The prediction at `x`, all normalised.
+    pub fn predict(&self, x: &[f64]) -> f64 {
+        let mut residual: Vec<f64> = x.iter().zip(&self.mean).map(|(x, mean)| x - mean).collect();
+        let mut y = self.offset;
+        for projection in &self.projections[..self.counting()] {
+            let s: f64 = projection.u.iter().zip(&residual).map(|(u, x)| u * x).sum();
+            y += projection.beta * s;
+            residual.iter_mut().zip(&projection.p).for_each(|(x, p)| *x -= p * s);
+        }
+        y
     }
 
     /// How many projections count in predictions: the last one only if it has seen enough.
     fn counting(&self) -> usize {
-        let enough = self.twice_inputs();
-        let last_counts = self.projections.last().is_some_and(|last| last.n_data > enough);
-        if last_counts { self.projections.len() } else { self.projections.len() - 1 }
-    }
-
-    /// The last projection that counts; the first in any case.
-    pub(super) fn last_counting(&self) -> &Projection {
-        &self.projections[self.counting().max(1) - 1]
-    }
-
-    fn twice_inputs(&self) -> f64 {
         #[expect(clippy::cast_precision_loss, reason = "at most 64 inputs")]
-        let inputs = self.mean.len() as f64;
-        2.0 * inputs
-    }
-
-    /// The prediction at `x`, normalised.
-    pub fn predict(&self, x: &[f64]) -> f64 {
-        self.opinion(x, 0.0).y
-    }
-
-    /// The prediction at `x`, where the field's activation is `w`, and its variance.
-    pub fn opinion(&self, x: &[f64], w: f64) -> Opinion {
-        let n = self.mean.len();
-        let mut room = [0.0; MAX_INPUTS];
-        let residual = &mut room[..n];
-        for ((residual, x), mean) in residual.iter_mut().zip(x).zip(&self.mean) {
-            *residual = x - mean;
-        }
-        let (mut y, mut leverage) = (self.offset, 0.0);
-        let vectors = self.u.chunks_exact(n).zip(self.p.chunks_exact(n));
-        for (projection, (u, p)) in self.projections[..self.counting()].iter().zip(vectors) {
-            let s = dot(u, residual);
-            y += projection.beta * s;
-            leverage += s * s / projection.ss_s2;
-            add(residual, -s, p);
-        }
-        let last = self.last_counting();
-        let noise = last.sum_e_cv2 / (last.sum_w - self.ss_p);
-        Opinion { y, variance: noise * (1.0 + w * leverage) }
-    }
-
-    /// Learns `sample`, and leaves what it found in `found`.
-    pub fn learn(&mut self, sample: &Sample<'_>, found: &mut Findings) {
-        let n = sample.x.len();
-        self.move_means(sample, found);
-        self.project(found);
-        let forgetting = self.projections.last().map_or(1.0, |last| last.lambda);
-        let (mut cost, mut fitted, mut target) = (0.0, 0.0, found.yz);
-        for (j, projection) in self.projections.iter_mut().enumerate() {
-            let (s, at) = (found.s[j], j * n..(j + 1) * n);
-            let x = &found.residuals[at.clone()];
-            fitted += projection.beta * s;
-            let (w, lambda) = (sample.w, projection.lambda);
-            turn(
-                &mut self.u[at.clone()],
-                &mut self.s_x_res_y_res[at.clone()],
-                (0.9 + 0.1 * lambda, w * target, x),
-            );
-            projection.sum_w = lambda * projection.sum_w + w;
-            projection.ss_s2 = lambda * projection.ss_s2 + w * s * s;
-            projection.ss_y_res = lambda * projection.ss_y_res + w * s * target;
-            projection.beta = projection.ss_y_res / projection.ss_s2;
-            let sums = &mut self.ss_x_res[at.clone()];
-            for ((sum, p), x) in sums.iter_mut().zip(&mut self.p[at]).zip(x) {
-                *sum = lambda * *sum + w * s * x;
-                *p = *sum / projection.ss_s2;
-            }
-            cost += w * w * s * s / projection.ss_s2;
-            target = found.yz - fitted;
-            found.e_cvs[j] = target;
-        }
-        self.ss_p = forgetting * self.ss_p + cost;
-        self.note_errors(sample.w, forgetting, found);
-    }
-
-    /// The weighted means and variances with the sample, and the sample relative to them.
-    fn move_means(&mut self, sample: &Sample<'_>, found: &mut Findings) {
-        let first = &self.projections[0];
-        let remembered = first.lambda * first.sum_w;
-        let all = 1.0 / (remembered + sample.w);
-        let blend = |old: f64, new: f64| (remembered * old + sample.w * new) * all;
-        let state = self.mean.iter_mut().zip(&mut self.var);
-        for (((mean, var), xz), x) in state.zip(&mut found.residuals).zip(sample.x) {
-            *mean = blend(*mean, *x);
-            *xz = x - *mean;
-            *var = blend(*var, *xz * *xz);
-        }
-        self.offset = blend(self.offset, sample.y);
-        found.yz = sample.y - self.offset;
-    }
-
-    /// Splits x₁ into projections s and residuals.
-    fn project(&self, found: &mut Findings) {
-        let n = self.mean.len();
-        let vectors = self.u.chunks_exact(n).zip(self.p.chunks_exact(n));
-        for (j, (u, p)) in vectors.enumerate() {
-            let (before, after) = found.residuals.split_at_mut((j + 1) * n);
-            let x = &before[j * n..];
-            let s = dot(u, x);
-            found.s[j] = s;
-            for ((next, x), p) in after.iter_mut().zip(x).zip(p) {
-                *next = x - p * s;
-            }
-        }
-    }
-
-    /// Notes how far off the fit was before and is after the sample.
-    fn note_errors(&mut self, w: f64, forgetting: f64, found: &mut Findings) {
-        self.project(found);
-        let counting = self.counting();
-        let mut fitted = 0.0;
-        for (projection, s) in self.projections[..counting].iter().zip(&found.s) {
-            fitted += projection.beta * s;
-        }
-        found.e = found.yz - fitted;
-        found.y = fitted + self.offset;
-        found.e_cv = counting.checked_sub(1).map_or(found.yz, |last| found.e_cvs[last]);
-        let first = self.projections[0];
-        if first.ripeness(first.lambda) > RIPE {
-            self.sum_e2 = forgetting * self.sum_e2 + w * found.e * found.e;
-            for (projection, e_cv) in self.projections.iter_mut().zip(&found.e_cvs) {
-                projection.sum_e_cv2 = projection.lambda * projection.sum_e_cv2 + w * e_cv * e_cv;
-            }
-        }
-        self.trustworthy = self.trustworthy || first.n_data > self.twice_inputs();
-    }
-
-    /// Ends a sample: adds a projection if the last one has paid, counts the sample and lets
-    /// the forgetting factors grow.
-    pub fn settle(&mut self, settings: &Settings) {
-        if self.wants_projection(settings) {
-            self.push(Projection::new(0.0, settings));
-            self.ss_p = 0.0;
-        }
-        let (tau, end) = (settings.tau_lambda, settings.final_lambda);
-        for projection in &mut self.projections {
-            projection.n_data = projection.n_data * projection.lambda + 1.0;
-            projection.lambda = tau * projection.lambda + end * (1.0 - tau);
-        }
-    }
-
-    /// Whether the last projection is well known and has lowered the error enough for
-    /// another to be tried.
-    fn wants_projection(&self, settings: &Settings) -> bool {
-        let [.., before, last] = &self.projections[..] else { return false };
-        let first = &self.projections[0];
-        self.projections.len() < settings.inputs
-            && last.mean_e_cv2() < settings.add_threshold * before.mean_e_cv2()
-            && last.n_data > AS_MUCH * first.n_data
-            && last.ripeness(last.lambda) > RIPE_FOR_NEXT
+        let enough = 2.0 * self.mean.len() as f64;
+        let unripe = self.projections.last().is_none_or(|last| last.n_data <= enough);
+        self.projections.len() - usize::from(unripe)
     }
 }
 
-/// Lets a direction `u` follow the remembered covariance of input and output.
-fn turn(u: &mut [f64], sums: &mut [f64], (kept, gain, x): (f64, f64, &[f64])) {
-    for (sum, x) in sums.iter_mut().zip(x) {
-        *sum = kept * *sum + gain * x;
+impl Field {
+    /// The field of these numbers.
+    pub fn from_column(size: Size, numbers: &[f64]) -> Self {
+        let n = size.inputs;
+        let (metric, rest) = numbers.split_at(size.metric());
+        let (base, rest) = rest.split_at(size.base());
+        let mut projections: Vec<_> = rest
+            .chunks_exact(size.projection())
+            .map(|numbers| Projection::from_column(n, numbers))
+            .collect();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
+        projections.truncate(base[COUNT] as usize);
+        let regression = Regression {
+            trustworthy: base[TRUSTWORTHY] > 0.0,
+            offset: base[OFFSET],
+            mean: base[BASE_SCALARS..][..n].to_vec(),
+            var: base[BASE_SCALARS + n..][..n].to_vec(),
+            sum_e2: base[SUM_E2],
+            ss_p: base[SS_P],
+            projections,
+        };
+        Self { regression, metric: Metric::from_column(size.entries, metric) }
     }
-    let square = dot(sums, sums);
-    if square > LEAST_SQUARE {
-        let length = square.sqrt();
-        for (u, sum) in u.iter_mut().zip(&*sums) {
-            *u = sum / length;
-        }
+
+    /// The numbers of which [`from_column`](Self::from_column) makes this field.
+    pub fn to_column(&self) -> Vec<f64> {
+        let Self { regression, metric } = self;
+        let trustworthy = f64::from(u8::from(regression.trustworthy));
+        #[expect(clippy::cast_precision_loss, reason = "at most 64 projections")]
+        let count = regression.projections.len() as f64;
+        let base = [trustworthy, regression.offset, regression.sum_e2, regression.ss_p, count];
+        let mut numbers = metric.to_column();
+        numbers.extend(filled_up([&base[..], &regression.mean, &regression.var].concat()));
+        numbers.extend(regression.projections.iter().flat_map(Projection::to_column));
+        numbers
+    }
+
+    /// Whether all lengths fit, every number is finite and every λ is one.
+    pub fn is_sound(&self, size: Size) -> bool {
+        let n = size.inputs;
+        let Self { regression, metric } = self;
+        (1..=n).contains(&regression.projections.len())
+            && regression.mean.len() == n
+            && regression.var.len() == n
+            && regression.projections.iter().all(|projection| projection.is_sound(n))
+            && metric.is_sound(size.entries)
+            && all_finite(&self.to_column())
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sum = 0.0;
-    for (a, b) in a.iter().zip(b) {
-        sum += a * b;
-    }
-    sum
-}
-
-/// Adds `factor` times `values`.
-fn add(to: &mut [f64], factor: f64, values: &[f64]) {
-    for (to, value) in to.iter_mut().zip(values) {
-        *to += factor * value;
-    }
+/// Zeros after the numbers, up to a whole chunk.
+fn filled_up(mut numbers: Vec<f64>) -> Vec<f64> {
+    numbers.resize(padded(numbers.len()), 0.0);
+    numbers
 }

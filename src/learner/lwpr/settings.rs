@@ -2,10 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::field::Size;
 use crate::learner::BuildError;
 use crate::learner::kernel::Kernel;
-use crate::learner::settings::{BIG, InitialMetric, SMALL, check_sizes, diagonal, range};
-use crate::learner::shapes::Size;
+use crate::learner::settings::{BIG, InitialMetric, SMALL, check_sizes, range, start};
+use crate::learner::growth;
+use crate::learner::shapes::triangle;
 
 /// All settings of the algorithm, named as in the literature. [`Settings::new`] gives the
 /// published values; what is marked "ours" is off there.
@@ -111,20 +113,16 @@ impl Settings {
         self.inputs.min(2)
     }
 
-    /// Whether D is, and stays, zero off its diagonal, which then is all that is kept of it.
-    pub(super) fn is_diagonal(&self) -> bool {
-        self.diag_only && !matches!(self.init_d, InitialMetric::Full(_))
-    }
-
-    /// The sizes of inputs, outputs and D.
+    /// How many numbers of each kind a field has.
     pub(super) fn size(&self) -> Size {
-        let entries = if self.is_diagonal() { self.inputs } else { self.inputs * self.inputs };
-        Size { inputs: self.inputs, outputs: self.outputs, entries }
+        let entries = if self.diag_only { self.inputs } else { triangle(self.inputs) };
+        Size { inputs: self.inputs, entries }
     }
 
-    /// How many numbers of M there are: its diagonal (`diag_only`) or all.
-    pub(super) fn factors(&self) -> usize {
-        if self.diag_only { self.inputs } else { self.inputs * self.inputs }
+    /// When fields come and go.
+    pub(super) fn growth(&self) -> growth::Rules {
+        let Self { w_gen, w_prune, max_fields, .. } = *self;
+        growth::Rules { w_gen, w_prune, max_fields }
     }
 
     /// γ, the penalty per input.
@@ -143,7 +141,7 @@ impl Settings {
         Some((floor, self.d_ceiling.map_or(f64::INFINITY, f64::sqrt)))
     }
 
-    /// D and M of new fields, each as its diagonal or by rows.
+    /// D and M of new fields: the diagonal (`diag_only`), or what is on and above it.
     ///
     /// # Errors
     /// When a number of the settings is outside its range, a length does not fit, or
@@ -152,10 +150,7 @@ impl Settings {
         let n = self.inputs;
         check_sizes((n, &self.norm_in), (self.outputs, &self.norm_out))?;
         self.check_ranges()?;
-        let (d, m) = self.init_d.factorise(n)?;
-        let d = if self.is_diagonal() { diagonal(&d, n) } else { d };
-        let m = if self.diag_only { diagonal(&m, n) } else { m };
-        Ok((d, m))
+        start(&self.init_d, n, self.diag_only)
     }
 
     fn check_ranges(&self) -> Result<(), BuildError> {

@@ -1,78 +1,89 @@
-//! What a field's regression says about its shape.
+//! What eight fields' regressions say about their shapes.
 
-use super::field::{Findings, RIPE, Regression};
+use fearless_simd::prelude::*;
+
+use super::field::{H, LAMBDA, R, SUM_E2, SUM_W};
+use super::regression::{Findings, Rows};
+use crate::learner::lanes::{Lanes, Row, all};
 use crate::learner::metric::Cost;
 
 /// Keeps the transient factor from dividing by 0.
 const TINY: f64 = 1e-10;
 
-/// How a sample's cost is reckoned.
-#[derive(Clone, Copy, Debug)]
+/// How a sample's cost is reckoned, and room for the memories that it leaves.
+#[derive(Clone, Debug)]
 pub struct Reckoning {
     /// Whether the second derivative is wanted.
     pub meta: bool,
     /// The least 1 − h. Ours.
     pub min_one_minus_h: Option<f64>,
+    /// H after the sample (up to n), not yet taken over,
+    pub h: Vec<Row>,
+    /// and r.
+    pub r: Vec<Row>,
 }
 
-impl Regression {
-    /// How the field's shape should change after a sample of the weighted activation `w`, of
-    /// which the regression has just found `found`; `None` while too little is known.
+impl Reckoning {
+    /// How the fields' shapes should change after a sample of the weighted activations `w`,
+    /// which took the regressions from `old` to `new` and of which they found `found`.
     ///
-    /// Leaves the memories H and r with the sample in `found`, to be taken over by
-    /// [`remember`](Self::remember).
-    pub fn judge(&self, w: f64, found: &mut Findings, rules: Reckoning) -> Option<Cost> {
-        let first = &self.projections[0];
-        if first.ripeness(first.lambda) <= RIPE {
-            return None;
-        }
-        let known = || {
-            let all = self.projections.iter().enumerate();
-            all.filter(|(_, projection)| projection.ripeness(first.lambda) > RIPE)
-        };
+    /// Only what a projection has seen enough of is heard; where even the first has not, the
+    /// answer means nothing. Leaves the memories H and r with the sample here.
+    #[inline(always)]
+    pub fn judge<S: Simd>(
+        &mut self,
+        simd: S,
+        (old, new): (&Rows<&[Row]>, &Rows<&[Row]>),
+        w: Lanes<S>,
+        found: &Findings,
+    ) -> Cost<S> {
+        let zero = all(simd, 0.0);
+        let one = all(simd, 1.0);
         // Σ s²/SSs2, Σ (s/SSs2) H and Σ (s/SSs2)² r.
-        let (mut leverage, mut through_slopes, mut through_variances) = (0.0, 0.0, 0.0);
-        for (j, projection) in known() {
-            let pull = found.s[j] / projection.ss_s2;
-            leverage += found.s[j] * pull;
-            through_slopes += pull * projection.h;
-            through_variances += pull * pull * projection.r;
+        let (mut leverage, mut through_slopes, mut through_variances) = (zero, zero, zero);
+        for j in 0..old.depth() {
+            let before = old.projection(j);
+            let s = found.s[j].get(simd);
+            let pull = old.knows(simd, j).select(s * found.per_s2[j].get(simd), zero);
+            leverage += s * pull;
+            through_slopes += pull * before.scalar(simd, H);
+            through_variances += pull * pull * before.scalar(simd, R);
         }
-        let Findings { e, e_cv, .. } = *found;
-        let share = 1.0 / first.sum_w;
-        let spread = self.last_counting().sum_e_cv2;
-        let transient = (self.sum_e2 / (spread + TINY)).powi(4).min(1.0);
+        let (e, e_cv) = (found.e.get(simd), found.e_cv.get(simd));
+        let share = one / new.first(simd, SUM_W);
+        let (spread, _) = new.spread(simd, old);
+        let ratio = new.base().scalars[SUM_E2].get(simd) / (spread + TINY);
+        let ratio2 = ratio * ratio;
+        let transient = ratio2 * ratio2;
+        let transient = transient.simd_gt(1.0).select(one, transient);
         let e_cv2 = e_cv * e_cv;
-        let j1_slope =
-            (-spread * share + e_cv2 - 2.0 * (e * through_slopes + through_variances)) * share;
-        let j1_curvature = if rules.meta {
-            (2.0 * (e * e * leverage - e_cv2 * share)
+        let j1_slope = (e_cv2 - spread * share - (e * through_slopes + through_variances) * 2.0)
+            * share;
+        let j1_curvature = if self.meta {
+            ((e * e * leverage - e_cv2 * share) * 2.0
                 + spread * share * share
-                + 4.0 * e * (share + leverage) * through_slopes)
+                + e * 4.0 * (share + leverage) * through_slopes)
                 * share
         } else {
-            0.0
+            zero
         };
 
-        let room = 1.0 - w * leverage;
-        let room = rules.min_one_minus_h.map_or(room, |least| room.max(least));
+        let room = one - w * leverage;
+        let room = match self.min_one_minus_h {
+            Some(least) => room.simd_lt(least).select(all(simd, least), room),
+            None => room,
+        };
         let credit = w / room * transient;
-        for (memory, projection) in self.projections.iter().enumerate() {
-            (found.h[memory], found.r[memory]) = (projection.h, projection.r);
+        for j in 0..old.depth() {
+            let before = old.projection(j);
+            let known = old.knows(simd, j);
+            let (s, lambda) = (found.s[j].get(simd), before.scalar(simd, LAMBDA));
+            let (h, r) = (before.scalar(simd, H), before.scalar(simd, R));
+            let with = lambda * h + credit * s * e_cv;
+            self.h[j].set(known.select(with, h));
+            let with = lambda * r + credit * w * e_cv2 * s * s;
+            self.r[j].set(known.select(with, r));
         }
-        for (j, projection) in known() {
-            let s = found.s[j];
-            found.h[j] = projection.lambda * projection.h + credit * s * e_cv;
-            found.r[j] = projection.lambda * projection.r + credit * w * e_cv2 * s * s;
-        }
-        Some(Cost { j1_slope, j1_curvature, share: w * share, transient })
-    }
-
-    /// Takes over the memories that [`judge`](Self::judge) left in `found`.
-    pub fn remember(&mut self, found: &Findings) {
-        let memories = found.h.iter().zip(&found.r);
-        for (projection, (&h, &r)) in self.projections.iter_mut().zip(memories) {
-            (projection.h, projection.r) = (h, r);
-        }
+        Cost { j1_slope, j1_curvature, share: w * share, transient }
     }
 }

@@ -2,30 +2,36 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Change;
 use super::field::{Field, Regression};
 use super::settings::Settings;
-use super::workshop::Workshop;
-use super::{Change, Growth};
+use super::workshop::{Consult, Teach, Workshop};
 use crate::learner::BuildError;
-use crate::learner::kernel::Window;
+use crate::learner::growth::{Growth, Wish};
+use crate::learner::lanes::run;
 use crate::learner::metric::Metric;
-use crate::learner::shapes::{Nearest, Shapes, Size, distance};
-
-/// A new field takes after the nearest one if that is activated by more than this share of
-/// `w_gen`.
-const KINSHIP: f64 = 0.1;
+use crate::learner::near::Near;
+use crate::learner::shapes::Shapes;
+use crate::learner::store::Store;
 
 /// Everything that is known of one output.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug)]
 pub struct Submodel {
+    size: super::field::Size,
+    pruned: u64,
+    shapes: Shapes,
+    /// All that fields know, in the order of [`Field::to_column`].
+    fields: Store,
+}
+
+/// A submodel as in a file.
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stored {
     pruned: u64,
     shapes: Shapes,
     fields: Vec<Field>,
 }
-
-/// A field and its activation.
-type Active = Option<(usize, f64)>;
 
 /// What the fields together say about an input, as sums over those that speak, and not yet
 /// scaled.
@@ -43,9 +49,13 @@ pub struct Voices {
 
 impl Submodel {
     /// One without fields.
-    pub fn new(settings: &Settings) -> Self {
-        let shapes = Shapes::new(settings.inputs, settings.is_diagonal());
-        Self { pruned: 0, shapes, fields: Vec::new() }
+    pub(super) fn new(settings: &Settings, shop: &Workshop) -> Self {
+        Self {
+            size: shop.size,
+            pruned: 0,
+            shapes: Shapes::new(settings.inputs, settings.diag_only),
+            fields: Store::new(settings.inputs, shop.blank(settings)),
+        }
     }
 
     /// How many fields were removed.
@@ -53,33 +63,60 @@ impl Submodel {
         self.pruned
     }
 
+    /// The number of fields.
+    pub fn len(&self) -> usize {
+        self.fields.fields()
+    }
+
+    /// Whether there are no fields.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// The centre of `field`, in normalised coordinates.
-    pub fn centre(&self, field: usize) -> &[f64] {
+    pub fn centre(&self, field: usize) -> Vec<f64> {
         self.shapes.centre(field)
     }
 
     /// The metric D of `field`, normalised: its diagonal, where the rest is 0 for good, or
     /// n × n by rows.
-    pub fn metric(&self, field: usize) -> &[f64] {
+    pub fn metric(&self, field: usize) -> Vec<f64> {
         self.shapes.metric(field)
     }
 
     /// The fields, in storage order.
-    pub fn fields(&self) -> &[Field] {
-        &self.fields
+    pub fn fields(&self) -> Vec<Field> {
+        (0..self.len()).map(|field| self.state(field)).collect()
     }
 
-    /// Says what is wrong with a submodel that was read from a file.
-    pub(super) fn check(&self, settings: &Settings) -> Result<(), BuildError> {
-        let fields = self.fields.len();
-        if !self.shapes.holds(settings.inputs, settings.is_diagonal(), fields) {
-            return Err(BuildError::Shapes { fields });
+    fn state(&self, field: usize) -> Field {
+        Field::from_column(self.size, &self.fields.column(field))
+    }
+
+    /// This submodel as in a file.
+    pub(super) fn store(&self) -> Stored {
+        Stored { pruned: self.pruned, shapes: self.shapes.clone(), fields: self.fields() }
+    }
+
+    /// A submodel from a file.
+    ///
+    /// # Errors
+    /// When it cannot be.
+    pub(super) fn restore(
+        stored: Stored,
+        settings: &Settings,
+        shop: &Workshop,
+    ) -> Result<Self, BuildError> {
+        let Stored { pruned, shapes, fields } = stored;
+        if !shapes.holds(settings.inputs, settings.diag_only, fields.len()) {
+            return Err(BuildError::Shapes { fields: fields.len() });
         }
-        let sound = |field: &Field| {
-            field.regression.is_sound(settings.inputs) && field.metric.is_sound(settings.factors())
-        };
-        let unsound = self.fields.iter().position(|field| !sound(field));
-        unsound.map_or(Ok(()), |field| Err(BuildError::Field { field }))
+        if let Some(field) = fields.iter().position(|field| !field.is_sound(shop.size)) {
+            return Err(BuildError::Field { field });
+        }
+        let mut submodel = Self { pruned, shapes, ..Self::new(settings, shop) };
+        fields.iter().for_each(|field| submodel.push(field, settings));
+        Ok(submodel)
     }
 
     /// Lets every active field learn the workshop's x and this `y`; then fields come and go.
@@ -90,117 +127,75 @@ impl Submodel {
         weight: f64,
         (shop, settings): (&mut Workshop, &Settings),
     ) -> (Voices, Change) {
-        let mut nearest = Nearest::NONE;
-        let mut voices = Voices::default();
-        for (index, field) in self.fields.iter_mut().enumerate() {
-            let (centre, d) = self.shapes.place(index, shop.size);
-            let q = distance(centre, d, &shop.x);
-            nearest.note(index, q);
-            if !shop.window.may_count(q) {
-                continue;
-            }
-            let w = shop.window.activation(q);
-            if w <= settings.cutoff {
-                continue;
-            }
-            let activation = shop.window.derivatives(w).times(weight);
-            let said = shop.teach(field, (centre, d), (activation, y), settings);
-            if field.regression.trustworthy && said.is_finite() {
-                voices.sum_w += w;
-                voices.sum_wy += w * said;
-            }
-        }
-        let strongest = |near: Active| {
-            let (index, w) = near.map(|(index, q)| (index, shop.window.activation(q)))?;
-            (w > 0.0).then_some((index, w))
-        };
-        let (first, second) = (strongest(nearest.first), strongest(nearest.second));
-        let growth = self.grow((first, second), y, (shop, settings));
-        let activation = |field: Active| field.map_or(0.0, |(_, w)| w);
+        let Self { shapes, fields, .. } = self;
+        let level = shop.level;
+        let teach = Teach { settings, shapes, fields, shop: &mut *shop, y, weight };
+        let (voices, strongest) = run(level, teach);
+        let growth = self.grow(strongest, y, (shop, settings));
+        let activation = |near: Near| near.map_or(0.0, |(_, w)| w);
         let change = Change {
-            max_activation: activation(first),
-            second_activation: activation(second),
+            max_activation: activation(strongest[0]),
+            second_activation: activation(strongest[1]),
             growth,
         };
         (voices, change)
     }
 
-    /// Hears all fields about the normalised `x`.
-    pub(super) fn consult(&self, x: &[f64], (size, window): (Size, Window), cutoff: f64) -> Voices {
-        let mut nearest = f64::INFINITY;
-        let mut voices = Voices::default();
-        for (Field { regression, .. }, (centre, d)) in
-            self.fields.iter().zip(self.shapes.each(size))
-        {
-            let q = distance(centre, d, x);
-            nearest = nearest.min(q);
-            if !window.may_count(q) {
-                continue;
-            }
-            let w = window.activation(q);
-            if w <= cutoff || !regression.trustworthy {
-                continue;
-            }
-            let said = regression.opinion(x, w);
-            voices.sum_w += w;
-            voices.sum_wy += w * said.y;
-            voices.sum_wy2 += w * (said.variance + said.y * said.y);
-        }
-        voices.max_activation = window.activation(nearest);
-        voices
+    /// Hears all fields about the normalised `x`, about the variance too if it is wanted.
+    pub(super) fn consult(&self, x: &[f64], shop: &Workshop, variance: bool) -> Voices {
+        let Self { shapes, fields, .. } = self;
+        run(shop.level, Consult { shapes, fields, shop, x, variance })
     }
 
     /// Adds a field in empty space, or removes one of two that overlap.
     fn grow(
         &mut self,
-        (first, second): (Active, Active),
+        strongest: [Near; 2],
         y: f64,
         (shop, settings): (&Workshop, &Settings),
     ) -> Growth {
-        let full = settings.max_fields.is_some_and(|most| self.fields.len() >= most as usize);
-        match (first, second) {
-            (Some((_, w)), None) if w > settings.w_gen => Growth::None,
-            (Some((first, w)), Some((second, w_second))) if w > settings.w_gen => {
-                if w_second > settings.w_prune { self.prune(first, second) } else { Growth::None }
-            }
-            _ if full => Growth::None,
-            _ => self.add(first, y, (shop, settings)),
+        let trusted = |field: usize| self.state(field).regression.trustworthy;
+        match settings.growth().wish(strongest, self.len(), trusted) {
+            Wish::Stay => Growth::None,
+            Wish::Add(template) => self.add(template, y, (shop, settings)),
+            Wish::Prune(first, second) => self.prune(first, second),
         }
     }
 
     fn add(
         &mut self,
-        strongest: Active,
+        template: Option<usize>,
         y: f64,
         (shop, settings): (&Workshop, &Settings),
     ) -> Growth {
-        let template = strongest
-            .filter(|&(index, w)| {
-                w > KINSHIP * settings.w_gen && self.fields[index].regression.trustworthy
-            })
-            .map(|(index, _)| index);
         let (offset, projections, metric, d) = if let Some(index) = template {
-            let Field { regression, metric } = &self.fields[index];
-            let metric = Metric::inheriting(metric.m.clone(), metric.alpha.clone());
-            let d = self.shapes.metric(index).to_vec();
-            (regression.offset, regression.projections.len(), metric, d)
+            let Field { regression, metric } = self.state(index);
+            let metric = Metric::inheriting(metric.m, metric.alpha);
+            (regression.offset, regression.projections.len(), metric, self.shapes.kept(index))
         } else {
             (y, settings.first_projections(), shop.start.clone(), shop.start_d.clone())
         };
-        let field = self.fields.len();
-        self.shapes.push(&shop.x, &d);
+        let field = self.len();
+        self.shapes.push(&shop.sample.x, &d);
         let regression = Regression::new(settings, offset, projections);
-        self.fields.push(Field { regression, metric });
+        self.push(&Field { regression, metric }, settings);
         Growth::Added { field, template }
+    }
+
+    /// Appends a field, with room for its projections.
+    fn push(&mut self, field: &Field, settings: &Settings) {
+        let numbers = field.to_column();
+        while self.fields.height() < numbers.len() {
+            let axis = (self.fields.height() - self.size.height(0)) / self.size.projection();
+            self.fields.extend(&super::field::Projection::new(axis, settings).to_column());
+        }
+        self.fields.push(&numbers);
     }
 
     /// Removes the wider of two fields, as the trace of D says; of equal ones the one
     /// activated less.
     fn prune(&mut self, first: usize, second: usize) -> Growth {
-        let trace = |field| {
-            let (d, n) = (self.shapes.metric(field), self.shapes.centre(field).len());
-            d.iter().step_by(if d.len() == n { 1 } else { n + 1 }).sum::<f64>()
-        };
+        let trace = |field| self.shapes.diagonal(field).iter().sum::<f64>();
         let (field, survivor) =
             if trace(first) < trace(second) { (first, second) } else { (second, first) };
         self.shapes.swap_remove(field);

@@ -1,44 +1,76 @@
-//! Where one field after the other learns a sample.
+//! Where the active fields learn a sample, eight at a time.
 
-use super::field::{Field, Findings, Regression, Sample};
+use fearless_simd::Level;
+use fearless_simd::prelude::*;
+
+use super::Change;
+use super::field::{COUNT, Field, LAMBDA, N_DATA, Projection, Regression, SS_P, Size};
+use super::regression::{Findings, Given, Rows, Speech};
 use super::settings::Settings;
 use super::shaping::Reckoning;
-use super::{Change, Growth};
+use super::submodel::Voices;
+use crate::learner::BuildError;
+use crate::learner::growth::Growth;
 use crate::learner::kernel::{Activation, Window};
-use crate::learner::metric::{Cost, Descent, Metric, Oversized, Rules};
-use crate::learner::shapes::{Size, is_positive};
-use crate::learner::{BuildError, all_finite};
+use crate::learner::lanes::{Eight, LANES, Lanes, Mask, Row, Work, all, finite, total};
+use crate::learner::metric::{Descent, Metric, Oversized, Rules};
+use crate::learner::near::{Group, Near, Search};
+use crate::learner::sample::Sample;
+use crate::learner::settings::MAX_INPUTS;
+use crate::learner::shapes::Shapes;
+use crate::learner::store::Store;
 
 /// The bi-square kernel ends at this q.
 const REACH: f64 = 4.0;
+/// With so few inputs the room for a prediction is small.
+const FEW_INPUTS: usize = 6;
 
 /// What follows from the settings, and room to work in, so that updates need no heap.
 #[derive(Clone, Debug)]
 pub struct Workshop {
+    /// The vector unit.
+    pub level: Level,
     /// The learner's sizes.
     pub size: Size,
     /// How fields answer.
     pub window: Window,
     rules: Rules,
     reckoning: Reckoning,
-    /// D of new fields,
+    /// D of new fields, as far as it is kept,
     pub start_d: Vec<f64>,
     /// and its factor.
     pub start: Metric,
-    /// The sample's inputs, normalised.
-    pub x: Vec<f64>,
-    /// Its outputs.
-    pub y: Vec<f64>,
+    /// The sample.
+    pub sample: Sample,
     /// The prediction the update returns.
     pub output: Vec<f64>,
     /// What happened to each output's fields.
     pub changes: Vec<Change>,
-    next: Regression,
-    next_metric: Metric,
-    /// The learned part of a D before and after the sample.
-    d: (Vec<f64>, Vec<f64>),
-    offset: Vec<f64>,
+    /// What eight fields know, where it does not lie ready,
+    room: Vec<Row>,
+    /// and what they are about to know.
+    next: Vec<Row>,
+    /// Their D, before and after.
+    d: (Vec<Row>, Vec<Row>),
+    /// How far the sample is from their centres.
+    offset: Vec<Row>,
     found: Findings,
+}
+
+/// Lets all active fields of one output learn the workshop's sample.
+pub struct Teach<'a> {
+    /// The settings.
+    pub settings: &'a Settings,
+    /// Where the fields are.
+    pub shapes: &'a mut Shapes,
+    /// What they know.
+    pub fields: &'a mut Store,
+    /// The workshop with the sample's inputs.
+    pub shop: &'a mut Workshop,
+    /// The sample's output, normalised.
+    pub y: f64,
+    /// How often the sample counts.
+    pub weight: f64,
 }
 
 impl Workshop {
@@ -49,11 +81,12 @@ impl Workshop {
     pub fn new(settings: &Settings) -> Result<Self, BuildError> {
         let (start_d, start_m) = settings.start()?;
         let (n, outputs) = (settings.inputs, settings.outputs);
-        let learned = vec![0.0; start_m.len()];
-        let start = Metric::new(start_m, settings.init_alpha);
+        let (size, room) = (settings.size(), vec![Row::ZERO; n]);
+        let d = vec![Row::ZERO; start_d.len()];
         let change = Change { max_activation: 0.0, second_activation: 0.0, growth: Growth::None };
         Ok(Self {
-            size: settings.size(),
+            level: Level::new(),
+            size,
             window: Window::new(settings.kernel, REACH, settings.cutoff),
             rules: Rules {
                 gamma: settings.gamma(),
@@ -61,85 +94,260 @@ impl Workshop {
                 oversized: Oversized::Skipped,
                 bounds: settings.bounds(),
             },
-            reckoning: Reckoning { meta: settings.meta, min_one_minus_h: settings.min_one_minus_h },
+            reckoning: Reckoning {
+                meta: settings.meta,
+                min_one_minus_h: settings.min_one_minus_h,
+                h: room.clone(),
+                r: room,
+            },
             start_d,
-            x: vec![0.0; n],
-            y: vec![0.0; outputs],
+            start: Metric::new(start_m, settings.init_alpha),
+            sample: Sample::new(n, outputs),
             output: vec![0.0; outputs],
             changes: vec![change; outputs],
-            // With room for all projections.
-            next: Regression::new(settings, 0.0, n),
-            next_metric: start.clone(),
-            start,
-            d: (learned.clone(), learned),
-            offset: vec![0.0; n],
+            room: vec![Row::ZERO; size.height(n)],
+            next: vec![Row::ZERO; size.height(n)],
+            d: (d.clone(), d),
+            offset: vec![Row::ZERO; n],
             found: Findings::new(n),
         })
     }
 
-    /// Lets `field`, which is at `centre` with the metric `d`, learn the workshop's x and
-    /// this `y`: regression first and then its shape. Each part learns in a copy, which takes
-    /// its place if sound. Returns the field's prediction in between.
-    pub fn teach(
-        &mut self,
-        field: &mut Field,
-        (centre, d): (&[f64], &mut [f64]),
-        (activation, y): (Activation, f64),
-        settings: &Settings,
-    ) -> f64 {
-        let Field { regression, metric } = field;
-        if activation.w <= 0.0 {
-            return regression.predict(&self.x);
+    /// The numbers of no field: some projections, none of which it has.
+    pub fn blank(&self, settings: &Settings) -> Vec<f64> {
+        let regression = Regression::new(settings, 0.0, settings.first_projections());
+        let mut numbers = Field { regression, metric: self.start.clone() }.to_column();
+        numbers[self.size.base_scalar(COUNT)] = 0.0;
+        numbers
+    }
+}
+
+/// The most of eight counts.
+#[inline(always)]
+fn most(counts: Row) -> usize {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts")]
+    let most = counts.0.into_iter().fold(1.0, f64::max) as usize;
+    most
+}
+
+impl Work for Teach<'_> {
+    type Output = (Voices, [Near; 2]);
+
+    /// Common sizes come as constants, with which loops are unrolled.
+    #[inline(always)]
+    fn with<S: Simd>(self, simd: S) -> Self::Output {
+        let Size { inputs, entries } = self.shop.size;
+        match (inputs, entries) {
+            (2, 2) => self.teach_all(simd, Size { inputs: 2, entries: 2 }),
+            (2, 3) => self.teach_all(simd, Size { inputs: 2, entries: 3 }),
+            (4, 4) => self.teach_all(simd, Size { inputs: 4, entries: 4 }),
+            (4, 10) => self.teach_all(simd, Size { inputs: 4, entries: 10 }),
+            _ => self.teach_all(simd, Size { inputs, entries }),
         }
-        self.next.copy(regression);
-        let sample = Sample { x: &self.x, y, w: activation.w };
-        self.next.learn(&sample, &mut self.found);
-        if !self.next.is_sound(self.x.len()) {
-            return regression.predict(&self.x);
+    }
+}
+
+impl Teach<'_> {
+    #[inline(always)]
+    fn teach_all<S: Simd>(mut self, simd: S, size: Size) -> (Voices, [Near; 2]) {
+        let (window, zero) = (self.shop.window, all(simd, 0.0));
+        let (mut sum_w, mut sum_wy) = (zero, zero);
+        let mut search = Search::new(simd, self.fields.gathers());
+        while let Some(Group { eight, q }) =
+            search.next(simd, (self.shapes, &window), &self.shop.sample.x[..size.inputs])
+        {
+            let w = window.activation(q);
+            let active = window.counts(w);
+            let heard = self.teach(simd, (eight, size), (active.select(w, zero), active));
+            sum_w += heard;
+            sum_wy += heard * self.shop.found.y.get(simd);
         }
-        if settings.update_d {
-            let cost = self.next.judge(activation.w, &mut self.found, self.reckoning);
-            if let Some(cost) = cost {
-                self.reshape(metric, (centre, d), activation, cost);
-            }
-        }
-        self.next.settle(settings);
-        regression.copy(&self.next);
-        self.found.y
+        let voices = Voices { sum_w: total(sum_w), sum_wy: total(sum_wy), ..Voices::default() };
+        (voices, window.strongest(simd, search.nearest()))
     }
 
-    /// Takes a step on the metric.
-    fn reshape(
+    /// Lets the active ones of eight fields learn the sample: regression first and then
+    /// shape. Each part is learned aside, and taken over where it is sound. Leaves what the
+    /// fields say in between, and returns the weights of those that speak.
+    #[inline(always)]
+    fn teach<S: Simd>(
         &mut self,
-        metric: &mut Metric,
-        (centre, d): (&[f64], &mut [f64]),
-        activation: Activation,
-        cost: Cost,
+        simd: S,
+        (eight, size): (Eight, Size),
+        (w, active): (Lanes<S>, Mask<S>),
+    ) -> Lanes<S> {
+        let activation = self.shop.window.derivatives(w, self.weight);
+        let counts = self.fields.row(&eight, size.base_scalar(COUNT));
+        let (start, end) = (size.metric(), size.height(most(counts)));
+        let Workshop { sample, room, next, found, .. } = &mut *self.shop;
+        let rows = self.fields.rows(simd, &eight, start..end, &mut room[start..end]);
+        let old = Rows::new(size, rows);
+        let next = &mut next[start..end];
+        let given = Given { x: &sample.x[..size.inputs], y: self.y, w: activation.w };
+        Rows::new(size, &mut *next).learn(simd, &old, given, (found, self.settings));
+        let new = Rows::new(size, &*next);
+        let sound = active & activation.w.simd_gt(0.0) & finite(simd, next);
+        let mut trusted = new.trustworthy(simd);
+        if (active & !sound).any_true() {
+            trusted = sound.select(trusted, old.trustworthy(simd));
+            found.y.set(sound.select(found.y.get(simd), old.predict(simd, given.x)));
+        }
+        let wanting = sound & new.wants_projection(simd, &old, self.settings);
+        let said = found.y.get(simd);
+        let speaking = active & trusted & said.is_finite();
+        let zero = all(simd, 0.0);
+        found.y.set(speaking.select(said, zero));
+        if self.settings.update_d {
+            self.reshape(simd, (eight, size, end), (activation, sound));
+        }
+        let mut heights = Row::ZERO;
+        let projection = f64_of(size.projection());
+        let learned = counts.get(simd) * projection + f64_of(size.base());
+        heights.set(sound.select(learned, zero));
+        self.fields.replace(simd, &eight, (start, heights), &self.shop.next[start..end]);
+        if wanting.any_true() {
+            self.add_projections(&eight, wanting.to_bitmask());
+        }
+        speaking.select(w, zero)
+    }
+
+    /// Lets the fields of `mask`, whose regressions have just learned, learn their shape.
+    #[inline(always)]
+    fn reshape<S: Simd>(
+        &mut self,
+        simd: S,
+        (eight, size, end): (Eight, Size, usize),
+        (activation, mask): (Activation<S>, Mask<S>),
     ) {
-        let n = centre.len();
-        for ((offset, x), centre) in self.offset.iter_mut().zip(&self.x).zip(centre) {
-            *offset = x - centre;
+        let Workshop { rules, reckoning, sample, room, next, d, offset, found, .. } =
+            &mut *self.shop;
+        let start = size.metric();
+        let (room, known) = room[..end].split_at_mut(start);
+        let known = if self.fields.gathers() {
+            &*known
+        } else {
+            self.fields.rows(simd, &eight, start..end, known)
+        };
+        let old = Rows::new(size, known);
+        let mask = mask & old.is_ripe(simd, old.first(simd, N_DATA));
+        if mask.all_false() {
+            return;
         }
-        let (before, after) = (&mut self.d.0, &mut self.d.1);
-        // Where M is diagonal and D is not, only D's diagonal is learned.
-        let stride = if before.len() < d.len() { n + 1 } else { 1 };
-        for (before, d) in before.iter_mut().zip(d.iter().step_by(stride)) {
-            *before = *d;
-        }
-        let descent = Descent { offset: &self.offset, d: before, activation, cost };
-        metric.descend(&mut self.next_metric, after, &descent, &self.rules);
-        let projections = self.next.projections.len();
-        let sound = self.next_metric.is_sound(after.len())
-            && all_finite(after)
-            && is_positive(after, n)
-            && all_finite(&self.found.h[..projections])
-            && all_finite(&self.found.r[..projections]);
-        if sound {
-            std::mem::swap(metric, &mut self.next_metric);
-            for (d, after) in d.iter_mut().step_by(stride).zip(&*after) {
-                *d = *after;
+        let (metric, next) = next[..end].split_at_mut(start);
+        let mut new = Rows::new(size, next);
+        let cost = reckoning.judge(simd, (&old, &new.read()), activation.w, found);
+        let (offset, old_d) = (&mut offset[..size.inputs], &mut d.0[..size.entries]);
+        self.shapes.gather(simd, (&eight, &sample.x[..size.inputs]), (offset, old_d));
+        let by = Descent { offset, d: old_d, activation, cost };
+        let depth = old.depth();
+        let memories = (&reckoning.h[..depth], &reckoning.r[..depth]);
+        let learned = rules.learned(size.entries);
+        let old_metric = self.fields.rows(simd, &eight, 0..start, room);
+        let new_d = &mut d.1[..size.entries];
+        let mask = mask
+            & rules.descend(simd, (old_metric, &mut *metric), new_d, &by)
+            & finite(simd, memories.0)
+            & finite(simd, memories.1);
+        new.remember(simd, mask, memories);
+        self.shapes.scatter(&eight, mask, new_d);
+        let mut heights = Row::ZERO;
+        heights.set(mask.select(all(simd, f64_of(learned)), all(simd, 0.0)));
+        self.fields.replace(simd, &eight, (0, heights), &metric[..learned]);
+    }
+
+    /// Gives the fields of these bits, which have just learned a sample, one projection more.
+    #[cold]
+    fn add_projections(&mut self, eight: &Eight, bits: u64) {
+        let (size, settings) = (self.shop.size, self.settings);
+        for lane in (0..LANES).filter(|lane| bits >> lane & 1 == 1) {
+            let field = eight[lane];
+            let count = self.fields.number(field, size.base_scalar(COUNT));
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
+            let axis = count as usize;
+            if self.fields.height() < size.height(axis + 1) {
+                self.fields.extend(&Projection::new(axis, settings).to_column());
             }
-            self.next.remember(&self.found);
+            // It counts the sample that it was born of, from nothing.
+            let (tau, end) = (settings.tau_lambda, settings.final_lambda);
+            let lambda = tau * settings.init_lambda + end * (1.0 - tau);
+            self.fields.set(field, size.scalar(axis, N_DATA), 1.0);
+            self.fields.set(field, size.scalar(axis, LAMBDA), lambda);
+            self.fields.set(field, size.base_scalar(COUNT), count + 1.0);
+            self.fields.set(field, size.base_scalar(SS_P), 0.0);
+        }
+    }
+}
+
+/// A count of numbers as a number.
+#[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
+fn f64_of(count: usize) -> f64 {
+    count as f64
+}
+
+/// Hears all fields of one output about a normalised input.
+pub struct Consult<'a> {
+    /// Where the fields are.
+    pub shapes: &'a Shapes,
+    /// What they know.
+    pub fields: &'a Store,
+    /// The workshop, for what follows from the settings.
+    pub shop: &'a Workshop,
+    /// The input.
+    pub x: &'a [f64],
+    /// Whether the variance is wanted too.
+    pub variance: bool,
+}
+
+/// Room for what predictions need of so many inputs: a base or a projection, with its scalars.
+const fn room_for(inputs: usize) -> usize {
+    2 * inputs + 12
+}
+
+impl Work for Consult<'_> {
+    type Output = Voices;
+
+    #[inline(always)]
+    fn with<S: Simd>(self, simd: S) -> Voices {
+        if self.x.len() <= FEW_INPUTS {
+            const ROOM: usize = room_for(FEW_INPUTS);
+            self.hear(simd, (&mut [Row::ZERO; ROOM], &mut [Row::ZERO; FEW_INPUTS]))
+        } else {
+            const ROOM: usize = room_for(MAX_INPUTS);
+            self.hear(simd, (&mut [Row::ZERO; ROOM], &mut [Row::ZERO; MAX_INPUTS]))
+        }
+    }
+}
+
+impl Consult<'_> {
+    #[inline(always)]
+    fn hear<S: Simd>(self, simd: S, (room, residual): (&mut [Row], &mut [Row])) -> Voices {
+        let Self { shapes, fields, shop: &Workshop { size, ref window, .. }, x, variance } = self;
+        let (residual, zero) = (&mut residual[..x.len()], all(simd, 0.0));
+        let (mut sum_w, mut sum_wy, mut sum_wy2) = (zero, zero, zero);
+        let mut search = Search::new(simd, fields.gathers());
+        while let Some(Group { eight, q }) = search.next(simd, (shapes, window), x) {
+            let w = window.activation(q);
+            let range = size.metric()..size.metric() + size.base_to_predict();
+            let base = fields.rows(simd, &eight, range, room);
+            let mut speech = Speech::begin(simd, size, base, (x, residual));
+            let speaking = window.counts(w) & speech.trustworthy;
+            for j in 0..most(base[COUNT]) {
+                let range = size.height(j)..size.height(j) + size.projection_to_predict();
+                speech.hear(simd, j, fields.rows(simd, &eight, range, room));
+            }
+            sum_w += speaking.select(w, zero);
+            sum_wy += speaking.select(w * speech.y, zero);
+            if variance {
+                let squares = speech.variance(w) + speech.y * speech.y;
+                sum_wy2 += speaking.select(w * squares, zero);
+            }
+        }
+        let [first, _] = window.strongest(simd, search.nearest());
+        Voices {
+            sum_w: total(sum_w),
+            sum_wy: total(sum_wy),
+            sum_wy2: total(sum_wy2),
+            max_activation: first.map_or(0.0, |(_, w)| w),
         }
     }
 }

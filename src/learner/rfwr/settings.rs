@@ -2,10 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::field::Size;
 use crate::learner::BuildError;
 use crate::learner::kernel::Kernel;
-use crate::learner::settings::{BIG, InitialMetric, SMALL, check_sizes, diagonal, range};
-use crate::learner::shapes::Size;
+use crate::learner::settings::{BIG, InitialMetric, SMALL, check_sizes, range, start};
+use crate::learner::growth;
+use crate::learner::shapes::triangle;
 
 /// All settings of the algorithm, named as in the literature. [`Settings::new`] gives the
 /// published values; what is marked "ours" is off there.
@@ -112,8 +114,14 @@ impl Settings {
 
     /// The sizes of everything.
     pub(super) fn size(&self) -> Size {
-        let entries = if self.diag_only { self.inputs } else { self.inputs * self.inputs };
+        let entries = if self.diag_only { self.inputs } else { triangle(self.inputs) };
         Size { inputs: self.inputs, outputs: self.outputs, entries }
+    }
+
+    /// When fields come and go.
+    pub(super) fn growth(&self) -> growth::Rules {
+        let Self { w_gen, w_prune, max_fields, .. } = *self;
+        growth::Rules { w_gen, w_prune, max_fields }
     }
 
     /// γ, the penalty per input.
@@ -132,7 +140,7 @@ impl Settings {
         Some((floor, self.d_ceiling.map_or(f64::INFINITY, f64::sqrt)))
     }
 
-    /// D and M of new fields, as the diagonal (`diag_only`) or by rows.
+    /// D and M of new fields: the diagonal (`diag_only`), or what is on and above it.
     ///
     /// # Errors
     /// When a number of the settings is outside its range, a length does not fit, or
@@ -141,11 +149,7 @@ impl Settings {
         let n = self.inputs;
         check_sizes((n, &self.norm_in), (self.outputs, &self.norm_out))?;
         self.check_ranges()?;
-        if self.diag_only && matches!(self.init_d, InitialMetric::Full(_)) {
-            return Err(BuildError::FullMetric);
-        }
-        let (d, m) = self.init_d.factorise(n)?;
-        Ok(if self.diag_only { (diagonal(&d, n), diagonal(&m, n)) } else { (d, m) })
+        start(&self.init_d, n, self.diag_only)
     }
 
     fn check_ranges(&self) -> Result<(), BuildError> {
