@@ -2,7 +2,7 @@
 
 use fearless_simd::prelude::*;
 
-use super::lanes::{Eight, LANES, Mask, Row, all};
+use super::lanes::{Eight, LANES, Mask, Row};
 
 /// A table with a column a field. Fields 0 to 7 are the first block, 8 to 15 the second; a
 /// block's rows lie one after the other, so that what a field needs lies close together.
@@ -117,45 +117,51 @@ impl Columns {
     /// Fills `into` with the numbers of eight fields from `start` on, a row a number.
     #[inline(always)]
     pub fn gather(&self, eight: &Eight, start: usize, into: &mut [Row]) {
-        let columns =
-            eight.map(|field| (&self.block(field / LANES)[start..][..into.len()], field % LANES));
-        for (k, into) in into.iter_mut().enumerate() {
-            *into = Row(columns.map(|(rows, lane)| rows[k].0[lane]));
+        if is_block(eight) {
+            into.copy_from_slice(&self.block(eight[0] / LANES)[start..][..into.len()]);
+            return;
+        }
+        for (lane, &field) in eight.iter().enumerate() {
+            let column = &self.block(field / LANES)[start..][..into.len()];
+            for (into, row) in into.iter_mut().zip(column) {
+                into.0[lane] = row.0[field % LANES];
+            }
         }
     }
 
-    /// Replaces the numbers, from `start` on, of those of eight fields that the mask names.
+    /// Replaces numbers of those of eight fields that the mask names, from `start` on, by
+    /// rows.
     #[inline(always)]
-    pub fn scatter<S: Simd>(&mut self, eight: &Eight, mask: Mask<S>, start: usize, from: &[Row]) {
+    pub fn scatter<S: Simd>(
+        &mut self,
+        simd: S,
+        (eight, mask): (&Eight, Mask<S>),
+        start: usize,
+        rows: &[Row],
+    ) {
+        if is_block(eight) {
+            for (old, new) in self.block_mut(eight[0] / LANES)[start..].iter_mut().zip(rows) {
+                old.set(mask.select(new.get(simd), old.get(simd)));
+            }
+            return;
+        }
         let bits = mask.to_bitmask();
         for (lane, &field) in eight.iter().enumerate() {
             if bits >> lane & 1 == 1 {
-                let column = &mut self.block_mut(field / LANES)[start..][..from.len()];
-                for (to, from) in column.iter_mut().zip(from) {
+                let column = &mut self.block_mut(field / LANES)[start..][..rows.len()];
+                for (to, from) in column.iter_mut().zip(rows) {
                     to.0[field % LANES] = from.0[lane];
                 }
             }
         }
     }
+}
 
-    /// Replaces numbers of a block's fields, from `start` on: of each field as many as
-    /// `counts` says.
-    #[inline(always)]
-    pub fn replace<S: Simd>(
-        &mut self,
-        simd: S,
-        block: usize,
-        (start, counts): (usize, Row),
-        rows: &[Row],
-    ) {
-        let counts = counts.get(simd);
-        let old = &mut self.block_mut(block)[start..];
-        let mut before = all(simd, 0.0);
-        for (old, new) in old.iter_mut().zip(rows) {
-            old.set(counts.simd_gt(before).select(new.get(simd), old.get(simd)));
-            before += 1.0;
-        }
-    }
+/// Whether eight fields are those of a block, in their order.
+#[inline(always)]
+fn is_block(eight: &Eight) -> bool {
+    let first = eight[0];
+    first.is_multiple_of(LANES) && eight.iter().enumerate().all(|(lane, &f)| f == first + lane)
 }
 
 #[cfg(test)]

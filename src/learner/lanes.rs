@@ -4,8 +4,9 @@
 //! quantity is a [`Row`] of eight numbers, one a field, and one instruction of the vector
 //! unit (two or four of a narrower one) does for eight fields what the equation says for one.
 //!
-//! No operation here is fused or approximate, and none depends on the machine: all vector
-//! units, and the plain code where there is none, give the same bits.
+//! No operation here is approximate, and none depends on the machine: all vector units, and
+//! the plain code where there is none, give the same bits. (Where a processor cannot multiply
+//! and add at once, which is none of the last ten years, [`fused`] is slow instead.)
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch, f64x8, i64x8, mask64x8};
@@ -69,12 +70,24 @@ pub fn all<S: Simd>(simd: S, value: f64) -> Lanes<S> {
     Lanes::splat(simd, value)
 }
 
+/// a b + c, rounded once.
+#[inline(always)]
+pub fn fused<S: Simd>(a: Lanes<S>, b: Lanes<S>, c: Lanes<S>) -> Lanes<S> {
+    a.mul_add_precise(b, c)
+}
+
+/// c − a b, rounded once.
+#[inline(always)]
+pub fn without<S: Simd>(c: Lanes<S>, a: Lanes<S>, b: Lanes<S>) -> Lanes<S> {
+    (-a).mul_add_precise(b, c)
+}
+
 /// The sum of products.
 #[inline(always)]
 pub fn dot<S: Simd>(simd: S, a: &[Row], b: &[Row]) -> Lanes<S> {
     let mut sum = all(simd, 0.0);
     for (a, b) in a.iter().zip(b) {
-        sum += a.get(simd) * b.get(simd);
+        sum = fused(a.get(simd), b.get(simd), sum);
     }
     sum
 }
@@ -89,14 +102,14 @@ pub fn multiply<S: Simd>(simd: S, v: &mut [Row], symmetric: &[Row], x: &[Row]) -
     while let ([here, x_after @ ..], [v_here, v_after @ ..]) = (x_rest, v_rest) {
         let (row, below) = rest.split_at(x_after.len() + 1);
         let here = here.get(simd);
-        let mut sum = v_here.get(simd) + row[0].get(simd) * here;
+        let mut sum = fused(row[0].get(simd), here, v_here.get(simd));
         for ((p, x), v) in row[1..].iter().zip(x_after).zip(&mut *v_after) {
             let p = p.get(simd);
-            sum += p * x.get(simd);
-            v.set(v.get(simd) + p * here);
+            sum = fused(p, x.get(simd), sum);
+            v.set(fused(p, here, v.get(simd)));
         }
         v_here.set(sum);
-        v_x += sum * here;
+        v_x = fused(sum, here, v_x);
         (rest, x_rest, v_rest) = (below, x_after, v_after);
     }
     v_x
@@ -131,27 +144,35 @@ pub fn exp<S: Simd>(x: Lanes<S>) -> Lanes<S> {
     const BIAS: i64 = 1023;
     let simd = x.simd;
     let in_range = x.max(all(simd, -700.0)).min(all(simd, 700.0));
-    let rounded = in_range * std::f64::consts::LOG2_E + ROUNDER;
+    let rounded = fused(in_range, all(simd, std::f64::consts::LOG2_E), all(simd, ROUNDER));
     let k = rounded - ROUNDER;
-    let r = in_range - k * LN2_HIGH - k * LN2_LOW;
+    let r = without(without(in_range, k, all(simd, LN2_HIGH)), k, all(simd, LN2_LOW));
     let r2 = r * r;
     let r4 = r2 * r2;
-    let term = |high: f64, low: f64| r * high + low;
-    let first = term(1.0, 1.0) + r2 * term(1.0 / 6.0, 0.5);
-    let second = term(1.0 / 5040.0, 1.0 / 720.0) * r2 + term(1.0 / 120.0, 1.0 / 24.0);
-    let third = term(1.0 / 39_916_800.0, 1.0 / 3_628_800.0) * r2
-        + term(1.0 / 362_880.0, 1.0 / 40_320.0);
-    let last = term(1.0 / 6_227_020_800.0, 1.0 / 479_001_600.0);
-    let power = first + r4 * (second + r4 * (third + r4 * last));
+    let first = fused(r2, line(r, 1.0 / 6.0, 0.5), line(r, 1.0, 1.0));
+    let second =
+        fused(r2, line(r, 1.0 / 5040.0, 1.0 / 720.0), line(r, 1.0 / 120.0, 1.0 / 24.0));
+    let third = fused(
+        r2,
+        line(r, 1.0 / 39_916_800.0, 1.0 / 3_628_800.0),
+        line(r, 1.0 / 362_880.0, 1.0 / 40_320.0),
+    );
+    let last = line(r, 1.0 / 6_227_020_800.0, 1.0 / 479_001_600.0);
+    let power = fused(r4, fused(r4, fused(r4, last, third), second), first);
     let bits: i64x8<S> = rounded.bitcast();
     let scale: Lanes<S> = ((bits + i64x8::splat(simd, BIAS)) << 52).bitcast();
     x.is_nan().select(x, power * scale)
 }
 
-/// Tells whether rows are finite by their sum: a number that is not finite makes the sum so
-/// too. A sum of finite numbers may overflow as well, hence a closer look at a bad one.
 #[inline(always)]
-pub fn finite<S: Simd>(simd: S, rows: &[Row]) -> Mask<S> {
+fn line<S: Simd>(r: Lanes<S>, slope: f64, offset: f64) -> Lanes<S> {
+    fused(r, all(r.simd, slope), all(r.simd, offset))
+}
+
+/// Where, within the mask, rows are finite. A number that is not finite makes a sum so too; a
+/// sum of finite numbers may overflow as well, hence a closer look at a bad one.
+#[inline(always)]
+pub fn finite<S: Simd>(simd: S, mask: Mask<S>, rows: &[Row]) -> Mask<S> {
     let mut sums = [all(simd, 0.0); 4];
     let mut chunks = rows.chunks_exact(4);
     for chunk in &mut chunks {
@@ -163,7 +184,7 @@ pub fn finite<S: Simd>(simd: S, rows: &[Row]) -> Mask<S> {
         *sum += row.get(simd);
     }
     let sound = ((sums[0] + sums[1]) + (sums[2] + sums[3])).is_finite();
-    if sound.all_true() { sound } else { finite_each(simd, rows) }
+    if (mask & !sound).all_false() { mask } else { mask & finite_each(simd, rows) }
 }
 
 /// [`finite`], number by number.
@@ -225,7 +246,7 @@ mod tests {
 
         #[inline(always)]
         fn with<S: Simd>(self, simd: S) -> u64 {
-            finite(simd, self.0).to_bitmask()
+            finite(simd, Mask::splat(simd, true), self.0).to_bitmask()
         }
     }
 

@@ -11,7 +11,7 @@ use fearless_simd::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::kernel::Activation;
-use super::lanes::{Cut, Lanes, Mask, Row, all, dot, exp, finite, multiply};
+use super::lanes::{Cut, Lanes, Mask, Row, all, dot, exp, finite, fused, multiply, without};
 use super::records::padded;
 use super::sample::all_finite;
 use super::shapes::{entry, on_diagonal};
@@ -156,15 +156,15 @@ impl Rules {
     }
 
     /// Takes one step: writes what comes after the metrics `old` into `next`, as far as
-    /// [`learned`](Self::learned), and its D into `d`. Returns where all is sound: finite,
-    /// with a positive diagonal of D.
+    /// [`learned`](Self::learned), and its D into `d`. Returns where, within the mask, all is
+    /// sound: finite, with a positive diagonal of D.
     #[inline(always)]
     pub fn descend<S: Simd>(
         &self,
         simd: S,
         (old, next): (&[Row], &mut [Row]),
         d: &mut [Row],
-        by: &Descent<'_, S>,
+        (by, mask): (&Descent<'_, S>, Mask<S>),
     ) -> Mask<S> {
         let (n, entries) = (by.offset.len(), by.d.len());
         let before = cut(entries, old);
@@ -186,7 +186,7 @@ impl Rules {
         } else {
             gram(simd, after.m, d, n);
         }
-        let mut sound = finite(simd, &next[..self.learned(entries)]) & finite(simd, d);
+        let mut sound = finite(simd, finite(simd, mask, &next[..self.learned(entries)]), d);
         for a in 0..n {
             let d = d[on_diagonal(n, entries, a)].get(simd);
             sound &= d.simd_ge(f64::MIN_POSITIVE);
@@ -249,9 +249,9 @@ fn learn_rates<S: Simd>(
     let by = next.m.iter().zip(&*next.alpha).zip(old.trace);
     for (trace, ((slope, alpha), old)) in next.trace.iter_mut().zip(by) {
         let (alpha, curvature) = (alpha.get(simd), trace.get(simd));
-        let kept = all(simd, 1.0) - alpha * curvature * transient;
+        let kept = without(all(simd, 1.0), alpha * transient, curvature);
         let kept = kept.simd_gt(0.0).select(kept, all(simd, 0.0));
-        trace.set(old.get(simd) * kept - alpha * (slope.get(simd) * transient));
+        trace.set(without(old.get(simd) * kept, alpha * transient, slope.get(simd)));
     }
 }
 
@@ -275,11 +275,10 @@ impl<S: Simd> Slopes<'_, S> {
         let Activation { slope, curvature, .. } = self.by.activation;
         let Cost { j1_slope, j1_curvature, share, .. } = self.by.cost;
         let w = slope * q;
-        let w_second = curvature * q * q + slope * 2.0 * offset * offset;
-        (
-            j1_slope * w + share * (j2 * self.gamma),
-            w_second * j1_slope + w * w * j1_curvature + share * (j2_second * self.gamma),
-        )
+        let w_second = fused(curvature * q, q, slope * 2.0 * offset * offset);
+        let penalty = share * self.gamma;
+        let bent = fused(w * w, j1_curvature, penalty * j2_second);
+        (fused(j1_slope, w, penalty * j2), fused(w_second, j1_slope, bent))
     }
 
     #[inline(always)]
@@ -364,7 +363,7 @@ fn gram<S: Simd>(simd: S, m: &[Row], d: &mut [Row], n: usize) {
             let (square, below) = squares.split_at_mut(length - a);
             let left = left.get(simd);
             for (d, right) in square.iter_mut().zip(&m[a..]) {
-                d.set(d.get(simd) + left * right.get(simd));
+                d.set(fused(left, right.get(simd), d.get(simd)));
             }
             squares = below;
         }

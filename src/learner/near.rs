@@ -3,7 +3,7 @@
 use fearless_simd::prelude::*;
 
 use super::kernel::Window;
-use super::lanes::{Eight, LANES, Lanes, Row, all};
+use super::lanes::{Eight, LANES, Lanes, Mask, Row, all};
 use super::shapes::Shapes;
 
 /// Walks over all fields: notes the nearest, and hands out those that may be active, eight at
@@ -14,8 +14,9 @@ pub struct Search<S: Simd> {
     gathers: bool,
     /// The next block of fields to be looked at.
     block: usize,
-    /// The fields found and not yet handed out.
-    found: [usize; 2 * LANES],
+    /// The fields found and not yet handed out,
+    found: [f64; 2 * LANES],
+    /// and their squared distances.
     q: [f64; 2 * LANES],
     count: usize,
     nearest: Nearest<S>,
@@ -34,7 +35,7 @@ impl<S: Simd> Search<S> {
     /// Before the first field.
     #[inline(always)]
     pub fn new(simd: S, gathers: bool) -> Self {
-        let (found, q) = ([0; 2 * LANES], [0.0; 2 * LANES]);
+        let (found, q) = ([0.0; 2 * LANES], [0.0; 2 * LANES]);
         Self { gathers, block: 0, found, q, count: 0, nearest: Nearest::none(simd) }
     }
 
@@ -56,17 +57,16 @@ impl<S: Simd> Search<S> {
             self.nearest.note(block, q);
             let near = window.may_count(q);
             if self.gathers {
-                self.keep(block, near.to_bitmask(), q);
+                self.keep(block, near, q);
             } else if near.any_true() {
-                let eight = std::array::from_fn(|lane| block * LANES + lane);
+                let mut eight = [block * LANES; LANES];
+                for (lane, field) in eight.iter_mut().enumerate() {
+                    *field += lane;
+                }
                 return Some(Group { eight, q });
             }
         }
-        let ([eight, rest], [q, q_rest]) = (halves(self.found), halves(self.q));
-        self.found[..LANES].copy_from_slice(&rest);
-        self.q[..LANES].copy_from_slice(&q_rest);
-        self.count -= LANES;
-        Some(Group { eight, q: q.simd_into(simd) })
+        Some(self.hand_out(simd))
     }
 
     /// The two nearest of the fields looked at.
@@ -75,38 +75,47 @@ impl<S: Simd> Search<S> {
         self.nearest.settle()
     }
 
-    /// Keeps the block's fields of these bits. All are written down, and those that are not
-    /// wanted are written over: cheaper than a decision for each.
+    /// Keeps the block's fields where the mask is true.
     #[inline(always)]
-    fn keep(&mut self, block: usize, bits: u64, q: Lanes<S>) {
-        let Row(q) = Row(q.into());
-        for (lane, q) in q.into_iter().enumerate() {
-            let at = self.count % (2 * LANES);
-            self.found[at] = block * LANES + lane;
-            self.q[at] = q;
-            self.count += usize::from(bits >> lane & 1 == 1);
-        }
+    fn keep(&mut self, block: usize, mask: Mask<S>, q: Lanes<S>) {
+        const PLACES: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+        #[expect(clippy::cast_precision_loss, reason = "exact below 2⁵³ fields")]
+        let first = (block * LANES) as f64;
+        let fields: Lanes<S> = PLACES.simd_into(q.simd);
+        let fields = (fields + first).compress(mask);
+        let end = self.count + LANES;
+        self.found[self.count..end].copy_from_slice(&Row(fields.into()).0);
+        self.q[self.count..end].copy_from_slice(&Row(q.compress(mask).into()).0);
+        self.count += mask.to_bitmask().count_ones() as usize;
     }
 
     /// Those that are left when all fields were looked at.
     #[inline(always)]
     fn last(&mut self, simd: S) -> Option<Group<S>> {
-        let (mut eight, mut q) = ([self.found[0]; LANES], [f64::INFINITY; LANES]);
-        for lane in 0..LANES {
-            if lane < self.count {
-                (eight[lane], q[lane]) = (self.found[lane], self.q[lane]);
-            }
+        if self.count == 0 {
+            return None;
         }
-        let some = self.count > 0;
-        self.count = 0;
-        some.then(|| Group { eight, q: q.simd_into(simd) })
+        for lane in self.count..LANES {
+            (self.found[lane], self.q[lane]) = (self.found[0], f64::INFINITY);
+        }
+        self.count = LANES;
+        Some(self.hand_out(simd))
     }
-}
 
-/// An array's first half and its second.
-#[inline(always)]
-fn halves<T: Copy>(both: [T; 2 * LANES]) -> [[T; LANES]; 2] {
-    [0, LANES].map(|start| std::array::from_fn(|k| both[start + k]))
+    /// The first eight of those found.
+    #[inline(always)]
+    fn hand_out(&mut self, simd: S) -> Group<S> {
+        let (mut eight, mut q) = ([0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a field")]
+            let field = self.found[lane] as usize;
+            (eight[lane], q[lane]) = (field, self.q[lane]);
+            self.found[lane] = self.found[LANES + lane];
+            self.q[lane] = self.q[LANES + lane];
+        }
+        self.count -= LANES;
+        Group { eight, q: q.simd_into(simd) }
+    }
 }
 
 /// The two fields nearest in their own metrics; of equally near ones the earlier is ahead.

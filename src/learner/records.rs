@@ -6,7 +6,7 @@ use std::ops::Range;
 use fearless_simd::prelude::*;
 use fearless_simd::f64x4;
 
-use super::lanes::{Eight, Row};
+use super::lanes::{Eight, LANES, Mask, Row};
 
 /// So many numbers of a field lie together.
 const CHUNK: usize = 4;
@@ -30,6 +30,7 @@ impl Chunk {
 /// A table with a record a field: numbers one after the other, filled up to whole chunks.
 #[derive(Clone, Debug)]
 pub struct Records {
+    /// The records, and after them room for eight that are nobody's.
     chunks: Vec<Chunk>,
     /// The record of a field that was given nothing.
     blank: Vec<Chunk>,
@@ -78,6 +79,11 @@ impl Records {
         &self.chunks[self.range(field)]
     }
 
+    #[inline(always)]
+    fn part(&self, field: usize, chunks: &Range<usize>) -> &[Chunk] {
+        &self.chunks[field * self.blank.len() + chunks.start..][..chunks.end - chunks.start]
+    }
+
     /// A number of a field.
     #[inline(always)]
     pub fn number(&self, field: usize, at: usize) -> f64 {
@@ -97,25 +103,33 @@ impl Records {
 
     /// Appends a field with these numbers, and then blank ones.
     pub fn push(&mut self, numbers: &[f64]) {
-        self.chunks.extend(&self.blank);
+        let place = self.range(self.fields);
         self.fields += 1;
+        self.make_room();
+        self.chunks[place].copy_from_slice(&self.blank);
         for (at, &number) in numbers.iter().enumerate() {
             self.set(self.fields - 1, at, number);
         }
+    }
+
+    /// Room for the fields, and for eight more that are nobody's.
+    fn make_room(&mut self) {
+        self.chunks.resize((self.fields + LANES) * self.blank.len(), Chunk([0.0; CHUNK]));
     }
 
     /// Removes `field`; the later ones move down.
     pub fn remove(&mut self, field: usize) {
         self.chunks.drain(self.range(field));
         self.fields -= 1;
+        self.make_room();
     }
 
     /// Removes `field`; the last one takes its place.
     pub fn swap_remove(&mut self, field: usize) {
         self.fields -= 1;
         let last = self.range(self.fields);
-        self.chunks.copy_within(last.clone(), field * self.blank.len());
-        self.chunks.truncate(last.start);
+        self.chunks.copy_within(last, field * self.blank.len());
+        self.make_room();
     }
 
     /// Gives every field further numbers, all blank.
@@ -134,7 +148,11 @@ impl Records {
     pub fn gather<S: Simd>(&self, simd: S, eight: &Eight, range: Range<usize>, rows: &mut [Row]) {
         let chunks = range.start / CHUNK..range.end.div_ceil(CHUNK);
         let rows = &mut rows[..chunks.len() * CHUNK];
-        let [a, b, c, d, e, f, g, h] = eight.map(|field| &self.record(field)[chunks.clone()]);
+        let [a, b, c, d, e, f, g, h] = *eight;
+        let (a, b) = (self.part(a, &chunks), self.part(b, &chunks));
+        let (c, d) = (self.part(c, &chunks), self.part(d, &chunks));
+        let (e, f) = (self.part(e, &chunks), self.part(f, &chunks));
+        let (g, h) = (self.part(g, &chunks), self.part(h, &chunks));
         for (k, rows) in rows.chunks_exact_mut(CHUNK).enumerate() {
             let [low_a, low_b, low_c, low_d] =
                 transpose([a[k].get(simd), b[k].get(simd), c[k].get(simd), d[k].get(simd)]);
@@ -147,43 +165,47 @@ impl Records {
         }
     }
 
-    /// Replaces numbers of eight fields, from `start` on, by rows: of each field as many as
-    /// `counts` says. All are multiples of a chunk.
+    /// Replaces numbers of those of eight fields that the mask names, from `start` on, by rows.
+    /// `start` and their number are whole chunks.
     #[inline(always)]
     pub fn scatter<S: Simd>(
         &mut self,
         simd: S,
-        eight: &Eight,
-        (start, counts): (usize, Row),
+        (eight, mask): (&Eight, Mask<S>),
+        start: usize,
         rows: &[Row],
     ) {
-        let stride = self.blank.len();
-        let places = eight.map(|field| field * stride + start / CHUNK);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts")]
-        let counts = counts.0.map(|count| count as usize / CHUNK);
+        let (stride, count, bits) = (self.blank.len(), rows.len() / CHUNK, mask.to_bitmask());
+        let mut places = [const { 0..0 }; LANES];
+        for (lane, place) in places.iter_mut().enumerate() {
+            // What nobody wants is written where nobody is: cheaper than a decision a chunk.
+            let wanted = bits >> lane & 1 == 1;
+            let field = if wanted { eight[lane] } else { self.fields + lane };
+            let start = field * stride + start / CHUNK;
+            *place = start..start + count;
+        }
+        // Fails only if a field were named twice.
+        let Ok([a, b, c, d, e, f, g, h]) = self.chunks.get_disjoint_mut(places) else { return };
         for (k, rows) in rows.chunks_exact(CHUNK).enumerate() {
             let (low_a, high_a) = simd.split_f64x8(rows[0].get(simd));
             let (low_b, high_b) = simd.split_f64x8(rows[1].get(simd));
             let (low_c, high_c) = simd.split_f64x8(rows[2].get(simd));
             let (low_d, high_d) = simd.split_f64x8(rows[3].get(simd));
-            let low = transpose([low_a, low_b, low_c, low_d]);
-            let high = transpose([high_a, high_b, high_c, high_d]);
-            for lane in 0..CHUNK {
-                if k < counts[lane] {
-                    self.chunks[places[lane] + k] = Chunk(low[lane].into());
-                }
-                if k < counts[CHUNK + lane] {
-                    self.chunks[places[CHUNK + lane] + k] = Chunk(high[lane].into());
-                }
-            }
+            [a[k], b[k], c[k], d[k]] = chunks(transpose([low_a, low_b, low_c, low_d]));
+            [e[k], f[k], g[k], h[k]] = chunks(transpose([high_a, high_b, high_c, high_d]));
         }
     }
+}
+
+#[inline(always)]
+fn chunks<S: Simd>([a, b, c, d]: [f64x4<S>; CHUNK]) -> [Chunk; CHUNK] {
+    [Chunk(a.into()), Chunk(b.into()), Chunk(c.into()), Chunk(d.into())]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learner::lanes::{LANES, Work, run};
+    use crate::learner::lanes::{Lanes, Work, run};
     use fearless_simd::Level;
 
     fn filled(fields: u32) -> Records {
@@ -219,18 +241,19 @@ mod tests {
         assert_eq!(first_numbers(&records), [5.0, 2.0, 3.0]);
     }
 
-    struct Negate<'a>(&'a mut Records, Eight, Row);
+    struct Negate<'a>(&'a mut Records, Eight, [f64; LANES]);
 
     impl Work for Negate<'_> {
         type Output = Vec<Row>;
 
         #[inline(always)]
         fn with<S: Simd>(self, simd: S) -> Vec<Row> {
-            let Self(records, eight, counts) = self;
+            let Self(records, eight, wanted) = self;
+            let wanted: Lanes<S> = wanted.simd_into(simd);
             let mut rows = vec![Row::ZERO; 8];
             records.gather(simd, &eight, 4..7, &mut rows[4..]);
             let negative: Vec<Row> = rows.iter().map(|row| Row(row.0.map(|x| -x))).collect();
-            records.scatter(simd, &eight, (4, counts), &negative[4..]);
+            records.scatter(simd, (&eight, wanted.simd_gt(0.0)), 4, &negative[4..]);
             rows
         }
     }
@@ -243,15 +266,14 @@ mod tests {
             records.push(&numbers);
         }
         let eight = [4, 0, 2, 1, 8, 7, 6, 5];
-        let mut counts = Row([4.0; LANES]);
-        counts.0[1] = 0.0;
-        let rows = run(Level::new(), Negate(&mut records, eight, counts));
+        let wanted = [1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
+        let rows = run(Level::new(), Negate(&mut records, eight, wanted));
         for at in 4..8 {
             #[expect(clippy::cast_precision_loss)]
             let expected = eight.map(|field| (10 * field + at) as f64);
             assert_eq!(rows[at].0, expected);
         }
         assert_eq!(records.column(8), [80.0, 81.0, 82.0, 83.0, -84.0, -85.0, -86.0, -87.0]);
-        assert_eq!(records.column(0)[4..], [4.0, 5.0, 6.0, 7.0], "a count of 0 writes nothing");
+        assert_eq!(records.column(0)[4..], [4.0, 5.0, 6.0, 7.0], "not wanted");
     }
 }

@@ -4,7 +4,7 @@ use fearless_simd::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::columns::Columns;
-use super::lanes::{Eight, Lanes, Mask, Row, all};
+use super::lanes::{Eight, Lanes, Mask, Row, all, fused};
 
 /// Centres c and distance metrics D of all fields, in normalised coordinates. They lie
 /// apart from all else: the search for the active fields, the hot loop of every prediction,
@@ -117,8 +117,8 @@ impl Shapes {
 
     /// Replaces the metrics of those of eight fields that the mask names.
     #[inline(always)]
-    pub fn scatter<S: Simd>(&mut self, eight: &Eight, mask: Mask<S>, d: &[Row]) {
-        self.columns.scatter(eight, mask, self.inputs, d);
+    pub fn scatter<S: Simd>(&mut self, simd: S, named: (&Eight, Mask<S>), d: &[Row]) {
+        self.columns.scatter(simd, named, self.inputs, d);
     }
 
     /// The squared distance q of `x` from the centres of a block.
@@ -188,7 +188,7 @@ fn distance<S: Simd>(simd: S, (centre, metric): (&[Row], &[Row]), x: &[f64]) -> 
     if metric.len() == x.len() {
         for ((d, centre), &x) in metric.iter().zip(centre).zip(x) {
             let offset = all(simd, x) - centre.get(simd);
-            q += offset * offset * d.get(simd);
+            q = fused(offset * offset, d.get(simd), q);
         }
         return q;
     }
@@ -197,10 +197,10 @@ fn distance<S: Simd>(simd: S, (centre, metric): (&[Row], &[Row]), x: &[f64]) -> 
         let (row, below) = rest.split_at(x_after.len() + 1);
         let mut along = all(simd, 0.0);
         for ((d, centre), &x) in row[1..].iter().zip(centres_after).zip(x_after) {
-            along += d.get(simd) * (all(simd, x) - centre.get(simd));
+            along = fused(d.get(simd), all(simd, x) - centre.get(simd), along);
         }
         let offset = all(simd, *x) - centre.get(simd);
-        q += (row[0].get(simd) * offset + (along + along)) * offset;
+        q = fused(fused(row[0].get(simd), offset, along + along), offset, q);
         (rest, x_rest, centres) = (below, x_after, centres_after);
     }
     q

@@ -5,7 +5,7 @@ use std::ops::Range;
 use fearless_simd::prelude::*;
 
 use super::columns::Columns;
-use super::lanes::{Eight, LANES, Row};
+use super::lanes::{Eight, LANES, Mask, Row};
 use super::records::Records;
 
 /// Up to so many inputs fields are small compared with the space: few of them are active at
@@ -96,7 +96,13 @@ impl Store {
     #[inline(always)]
     pub fn row(&self, eight: &Eight, at: usize) -> Row {
         match self {
-            Self::Records(records) => Row(eight.map(|field| records.number(field, at))),
+            Self::Records(records) => {
+                let mut row = Row::ZERO;
+                for (number, &field) in row.0.iter_mut().zip(eight) {
+                    *number = records.number(field, at);
+                }
+                row
+            }
             Self::Columns(columns) => columns.block(eight[0] / LANES)[at],
         }
     }
@@ -120,21 +126,16 @@ impl Store {
         }
     }
 
-    /// Replaces numbers of eight fields, from `start` on, by rows: of each field as many as
-    /// `counts` says. All are multiples of four.
+    /// Replaces numbers of those of eight fields that the mask names, from `start` on, by
+    /// rows. `start` and their number are multiples of four.
     #[inline(always)]
     pub fn replace<S: Simd>(
         &mut self,
         simd: S,
-        eight: &Eight,
-        (start, counts): (usize, Row),
+        (eight, mask): (&Eight, Mask<S>),
+        start: usize,
         rows: &[Row],
     ) {
-        match self {
-            Self::Records(records) => records.scatter(simd, eight, (start, counts), rows),
-            Self::Columns(columns) => {
-                columns.replace(simd, eight[0] / LANES, (start, counts), rows);
-            }
-        }
+        either!(self, table => table.scatter(simd, (eight, mask), start, rows));
     }
 }

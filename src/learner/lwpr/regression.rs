@@ -7,7 +7,7 @@ use super::field::{
     SS_Y_RES, SUM_E_CV2, SUM_E2, SUM_W, Size, TRUSTWORTHY,
 };
 use super::settings::Settings;
-use crate::learner::lanes::{Cut, Lanes, Mask, Row, all, dot};
+use crate::learner::lanes::{Cut, Lanes, Mask, Row, all, dot, fused, without};
 use crate::learner::settings::MAX_INPUTS;
 
 /// The direction of a projection turns only to a vector whose square is larger than this.
@@ -236,10 +236,10 @@ impl<'a, S: Simd> Speech<'a, S> {
         let (scalars, u, p) = self.size.cut_to_predict(rows);
         let counts = counts(self.size, self.count - count(j), scalars[N_DATA].get(simd));
         let s = counts.select(dot(simd, u, self.residual), all(simd, 0.0));
-        self.y += scalars[BETA].get(simd) * s;
+        self.y = fused(scalars[BETA].get(simd), s, self.y);
         self.leverage += s * s / scalars[SS_S2].get(simd);
         for (residual, p) in self.residual.iter_mut().zip(p) {
-            residual.set(residual.get(simd) - p.get(simd) * s);
+            residual.set(without(residual.get(simd), p.get(simd), s));
         }
         let heard = if j == 0 { Mask::splat(simd, true) } else { counts };
         let (errors, sum_w) = (scalars[SUM_E_CV2].get(simd), scalars[SUM_W].get(simd));
@@ -304,13 +304,13 @@ impl Rows<&mut [Row]> {
             let before = old.projection(j);
             let has = old.has(simd, j);
             let s = has.select(dot(simd, before.u, &found.residual[..old.size.inputs]), zero);
-            fitted += before.scalar(simd, BETA) * s;
+            fitted = fused(before.scalar(simd, BETA), s, fitted);
             forgetting = has.select(before.scalar(simd, LAMBDA), forgetting);
             let heard = (given.w, s, target);
             let residual = (&mut found.residual[..old.size.inputs], settings);
             let per_s2 = self.projection(j).learn(simd, &before, heard, residual);
             found.per_s2[j].set(per_s2);
-            cost += given.w * given.w * s * s * per_s2;
+            cost = fused(given.w * s * (given.w * s), per_s2, cost);
             target = yz - fitted;
             found.e_cvs[j].set(target);
         }
@@ -338,10 +338,10 @@ impl Rows<&mut [Row]> {
             before.zip(after).zip(found.residual.iter_mut().zip(given.x))
         {
             let x = all(simd, x);
-            let mean = (remembered * before.0.get(simd) + given.w * x) * shares;
+            let mean = fused(remembered, before.0.get(simd), given.w * x) * shares;
             let z = x - mean;
             after.0.set(mean);
-            after.1.set((remembered * before.1.get(simd) + given.w * (z * z)) * shares);
+            after.1.set(fused(remembered, before.1.get(simd), given.w * (z * z)) * shares);
             xz.set(z);
         }
         let y = all(simd, given.y);
@@ -374,7 +374,7 @@ impl Rows<&mut [Row]> {
                 let s = dot(simd, projection.u, &found.residual[..old.size.inputs]);
                 found.s[j].set(s);
                 for (residual, p) in found.residual.iter_mut().zip(projection.p) {
-                    residual.set(residual.get(simd) - p.get(simd) * s);
+                    residual.set(without(residual.get(simd), p.get(simd), s));
                 }
                 let counts = old.counts(simd, j, before.scalar(simd, N_DATA));
                 fitted += counts.select(projection.scalar(simd, BETA) * s, zero);
@@ -385,7 +385,7 @@ impl Rows<&mut [Row]> {
             let before = old.projection(j);
             let e_cv = found.e_cvs[j].get(simd);
             let (sum, lambda) = (before.scalar(simd, SUM_E_CV2), before.scalars[LAMBDA]);
-            let counted = lambda.get(simd) * sum + w * e_cv * e_cv;
+            let counted = fused(lambda.get(simd), sum, w * e_cv * e_cv);
             self.projection(j).scalars[SUM_E_CV2].set(ripe.select(counted, sum));
         }
         let e = yz - fitted;
@@ -467,10 +467,11 @@ impl ProjectionRows<&mut [Row]> {
         (residual, settings): (&mut [Row], &Settings),
     ) -> Lanes<S> {
         let lambda = before.scalar(simd, LAMBDA);
-        let ss_s2 = lambda * before.scalar(simd, SS_S2) + w * s * s;
-        let ss_y_res = lambda * before.scalar(simd, SS_Y_RES) + w * s * target;
+        let (turning, pull) = (w * target, w * s);
+        let ss_s2 = fused(lambda, before.scalar(simd, SS_S2), pull * s);
+        let ss_y_res = fused(lambda, before.scalar(simd, SS_Y_RES), turning * s);
         let per_s2 = all(simd, 1.0) / ss_s2;
-        self.scalars[SUM_W].set(lambda * before.scalar(simd, SUM_W) + w);
+        self.scalars[SUM_W].set(fused(lambda, before.scalar(simd, SUM_W), w));
         self.scalars[SS_S2].set(ss_s2);
         self.scalars[SS_Y_RES].set(ss_y_res);
         self.scalars[BETA].set(ss_y_res * per_s2);
@@ -478,7 +479,7 @@ impl ProjectionRows<&mut [Row]> {
         self.scalars[N_DATA].set(before.scalar(simd, N_DATA) * lambda + 1.0);
         self.scalars[LAMBDA].set(lambda * tau + end * (1.0 - tau));
         (self.scalars[H], self.scalars[R]) = (before.scalars[H], before.scalars[R]);
-        let (kept, turning, pull) = (lambda * 0.1 + 0.9, w * target, w * s);
+        let kept = lambda * 0.1 + 0.9;
         let mut square = all(simd, 0.0);
         let before_sums = before.s_x_res_y_res.iter().zip(before.ss_x_res).zip(before.p);
         let sums = self.s_x_res_y_res.iter_mut().zip(self.ss_x_res).zip(self.p);
@@ -486,13 +487,13 @@ impl ProjectionRows<&mut [Row]> {
             sums.zip(before_sums).zip(residual)
         {
             let x = residual.get(simd);
-            let along = kept * old_turned.get(simd) + turning * x;
-            square += along * along;
+            let along = fused(kept, old_turned.get(simd), turning * x);
+            square = fused(along, along, square);
             turned.set(along);
-            let accounted = lambda * old_sum.get(simd) + pull * x;
+            let accounted = fused(lambda, old_sum.get(simd), pull * x);
             sum.set(accounted);
             p.set(accounted * per_s2);
-            residual.set(x - old_p.get(simd) * s);
+            residual.set(without(x, old_p.get(simd), s));
         }
         let turns = square.simd_gt(LEAST_SQUARE);
         let per_length = all(simd, 1.0) / square.sqrt();

@@ -186,7 +186,7 @@ impl Teach<'_> {
         let given = Given { x: &sample.x[..size.inputs], y: self.y, w: activation.w };
         Rows::new(size, &mut *next).learn(simd, &old, given, (found, self.settings));
         let new = Rows::new(size, &*next);
-        let sound = active & activation.w.simd_gt(0.0) & finite(simd, next);
+        let sound = finite(simd, active & activation.w.simd_gt(0.0), next);
         let mut trusted = new.trustworthy(simd);
         if (active & !sound).any_true() {
             trusted = sound.select(trusted, old.trustworthy(simd));
@@ -200,11 +200,7 @@ impl Teach<'_> {
         if self.settings.update_d {
             self.reshape(simd, (eight, size, end), (activation, sound));
         }
-        let mut heights = Row::ZERO;
-        let projection = f64_of(size.projection());
-        let learned = counts.get(simd) * projection + f64_of(size.base());
-        heights.set(sound.select(learned, zero));
-        self.fields.replace(simd, &eight, (start, heights), &self.shop.next[start..end]);
+        self.take_over(simd, (&eight, size), (counts.get(simd), sound), end);
         if wanting.any_true() {
             self.add_projections(&eight, wanting.to_bitmask());
         }
@@ -244,15 +240,35 @@ impl Teach<'_> {
         let learned = rules.learned(size.entries);
         let old_metric = self.fields.rows(simd, &eight, 0..start, room);
         let new_d = &mut d.1[..size.entries];
-        let mask = mask
-            & rules.descend(simd, (old_metric, &mut *metric), new_d, &by)
-            & finite(simd, memories.0)
-            & finite(simd, memories.1);
+        let mask = rules.descend(simd, (old_metric, &mut *metric), new_d, (&by, mask));
+        let mask = finite(simd, finite(simd, mask, memories.0), memories.1);
         new.remember(simd, mask, memories);
-        self.shapes.scatter(&eight, mask, new_d);
-        let mut heights = Row::ZERO;
-        heights.set(mask.select(all(simd, f64_of(learned)), all(simd, 0.0)));
-        self.fields.replace(simd, &eight, (0, heights), &metric[..learned]);
+        self.shapes.scatter(simd, (&eight, mask), new_d);
+        self.fields.replace(simd, (&eight, mask), 0, &metric[..learned]);
+    }
+
+    /// Takes over what the fields of `mask` have learned, but for their metrics.
+    #[inline(always)]
+    fn take_over<S: Simd>(
+        &mut self,
+        simd: S,
+        (eight, size): (&Eight, Size),
+        (counts, mask): (Lanes<S>, Mask<S>),
+        end: usize,
+    ) {
+        let depth = (end - size.height(0)) / size.projection();
+        let (mut start, mut has) = (size.metric(), mask);
+        for j in 1..=depth {
+            #[expect(clippy::cast_precision_loss, reason = "at most 64 projections")]
+            let has_next = mask & counts.simd_gt(j as f64);
+            // Projections that the same fields have go together.
+            if j < depth && (has & !has_next).all_false() {
+                continue;
+            }
+            let rows = &self.shop.next[start..size.height(j)];
+            self.fields.replace(simd, (eight, has), start, rows);
+            (start, has) = (size.height(j), has_next);
+        }
     }
 
     /// Gives the fields of these bits, which have just learned a sample, one projection more.
@@ -276,12 +292,6 @@ impl Teach<'_> {
             self.fields.set(field, size.base_scalar(SS_P), 0.0);
         }
     }
-}
-
-/// A count of numbers as a number.
-#[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
-fn f64_of(count: usize) -> f64 {
-    count as f64
 }
 
 /// Hears all fields of one output about a normalised input.

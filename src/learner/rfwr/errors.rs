@@ -6,7 +6,7 @@ use fearless_simd::prelude::*;
 use super::field::{ErrorRows, SUM_E_CV2, SUM_E2};
 use super::regression::Findings;
 use super::settings::Settings;
-use crate::learner::lanes::{Lanes, Row, all, dot};
+use crate::learner::lanes::{Lanes, Row, all, dot, fused};
 use crate::learner::metric::Cost;
 
 /// Keeps the transient factor from dividing by 0.
@@ -64,8 +64,8 @@ impl ErrorRows<&mut [Row]> {
             let rows = self.h[at.clone()].iter_mut().zip(&old.h[at]);
             for (((next, h), xz), v) in rows.zip(xz).zip(v) {
                 let h = h.get(simd);
-                pull += v.get(simd) * h;
-                next.set(lambda * h + gain * xz.get(simd));
+                pull = fused(v.get(simd), h, pull);
+                next.set(fused(lambda, h, gain * xz.get(simd)));
             }
             through_slopes += e[k].get(simd) * pull;
         }
@@ -112,8 +112,8 @@ impl ErrorRows<&mut [Row]> {
             let mut off = all(simd, 0.0);
             for (((next, r), xz), v) in next.iter_mut().zip(row).zip(&xz[a..]).zip(&v[a..]) {
                 let r = r.get(simd);
-                off += r * v.get(simd);
-                next.set(lambda * r + pull * xz.get(simd));
+                off = fused(r, v.get(simd), off);
+                next.set(fused(lambda, r, pull * xz.get(simd)));
             }
             // Each entry off the diagonal stands for two.
             let v = v[a].get(simd);

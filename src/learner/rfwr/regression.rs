@@ -4,7 +4,7 @@ use fearless_simd::prelude::*;
 
 use super::field::{LAMBDA, N_DATA, RegressionRows, SUM_W, Size, TRUSTWORTHY};
 use super::settings::Settings;
-use crate::learner::lanes::{Lanes, Mask, Row, all, dot, multiply};
+use crate::learner::lanes::{Lanes, Mask, Row, all, dot, fused, multiply, without};
 use crate::learner::shapes::entry;
 
 /// What the regressions found about a sample, for the errors: rows that each
@@ -64,7 +64,7 @@ pub fn predict<S: Simd>(
 ) -> Lanes<S> {
     let mut y = offset[0].get(simd);
     for ((slope, mean), &x) in slopes.iter().zip(mean).zip(x) {
-        y += slope.get(simd) * (all(simd, x) - mean.get(simd));
+        y = fused(slope.get(simd), all(simd, x) - mean.get(simd), y);
     }
     y
 }
@@ -117,9 +117,9 @@ impl Next<'_> {
             for (((after, before), v), xz) in
                 after.iter_mut().zip(before).zip(&found.v).zip(&found.xz)
             {
-                let slope = before.get(simd) + gain * v.get(simd);
+                let slope = fused(gain, v.get(simd), before.get(simd));
                 after.set(slope);
-                fitted += slope * xz.get(simd);
+                fitted = fused(slope, xz.get(simd), fitted);
             }
             found.e_cv[k].set(e_cv);
             found.e[k].set(yz - fitted);
@@ -154,10 +154,10 @@ impl Next<'_> {
         let after = self.mean.iter_mut().zip(&mut *self.var);
         for ((before, after), (xz, &x)) in before.zip(after).zip(found.xz.iter_mut().zip(given.x)) {
             let x = all(simd, x);
-            let mean = past * before.0.get(simd) + now * x;
+            let mean = fused(past, before.0.get(simd), now * x);
             let z = x - mean;
             after.0.set(mean);
-            after.1.set(past * before.1.get(simd) + now * (z * z));
+            after.1.set(fused(past, before.1.get(simd), now * (z * z)));
             xz.set(z);
         }
         (past, now)
@@ -183,9 +183,9 @@ impl Next<'_> {
         for a in 0..n {
             let ((row, rest), (next, next_rest)) = (old.split_at(n - a), new.split_at_mut(n - a));
             (old, new) = (rest, next_rest);
-            let pull = found.v[a].get(simd);
+            let pull = found.v[a].get(simd) * gain;
             for ((next, p), v) in next.iter_mut().zip(row).zip(&found.v[a..]) {
-                next.set((p.get(simd) - pull * v.get(simd) * gain) * growth);
+                next.set(without(p.get(simd), pull, v.get(simd)) * growth);
             }
         }
         for v in &mut found.v {

@@ -171,7 +171,7 @@ impl Teach<'_> {
         let (next, ..) = size.cut(&mut next[..]);
         let given = Given { x: &sample.x[..size.inputs], y: &sample.y, w: activation.w };
         size.cut_regression(&mut *next).learn(simd, size, &old, given, found, self.settings);
-        let sound = active & activation.w.simd_gt(0.0) & finite(simd, next);
+        let sound = finite(simd, active & activation.w.simd_gt(0.0), next);
         let mut trusted = size.cut_regression(&*next).trustworthy(simd);
         let mut lost = active & !sound;
         if lost.any_true() {
@@ -183,7 +183,7 @@ impl Teach<'_> {
             }
             lost &= worn_out(simd, old.p);
         }
-        let speaking = active & trusted & finite(simd, &found.y);
+        let speaking = finite(simd, active & trusted, &found.y);
         let zero = all(simd, 0.0);
         for (sum, said) in voices.iter_mut().zip(&found.y) {
             sum.set(sum.get(simd) + speaking.select(w * said.get(simd), zero));
@@ -192,7 +192,7 @@ impl Teach<'_> {
             self.reshape(simd, (eight, size), (activation, sound));
         }
         let (learned, ..) = size.cut(&self.shop.next[..]);
-        self.fields.replace(simd, &eight, (0, where_true(simd, sound, learned.len())), learned);
+        self.fields.replace(simd, (&eight, sound), 0, learned);
         if lost.any_true() {
             self.mend(&eight, lost.to_bitmask());
         }
@@ -233,12 +233,10 @@ impl Teach<'_> {
         self.shapes.gather(simd, (&eight, &sample.x[..size.inputs]), (offset, old_d));
         let by = Descent { offset, d: old_d, activation, cost };
         let new_d = &mut d.1[..size.entries];
-        let mask = mask
-            & finite(simd, errors)
-            & rules.descend(simd, (old_metric, &mut *metric), new_d, &by);
-        self.shapes.scatter(&eight, mask, new_d);
-        let counts = where_true(simd, mask, learned);
-        self.fields.replace(simd, &eight, (start, counts), &next[start..start + learned]);
+        let mask = finite(simd, mask, errors);
+        let mask = rules.descend(simd, (old_metric, &mut *metric), new_d, (&by, mask));
+        self.shapes.scatter(simd, (&eight, mask), new_d);
+        self.fields.replace(simd, (&eight, mask), start, &next[start..start + learned]);
     }
 
     /// Starts P of the fields of these bits anew.
@@ -262,14 +260,6 @@ fn worn_out<S: Simd>(simd: S, p: &[Row]) -> Mask<S> {
         worn_out |= p.get(simd).abs().simd_gt(WORN_OUT);
     }
     worn_out
-}
-
-/// A count where the mask is true, and 0 elsewhere.
-#[inline(always)]
-fn where_true<S: Simd>(simd: S, mask: Mask<S>, count: usize) -> Row {
-    #[expect(clippy::cast_precision_loss, reason = "far below 2⁵³")]
-    let count = all(simd, count as f64);
-    Row(mask.select(count, all(simd, 0.0)).into())
 }
 
 /// Hears all fields about a normalised input.
