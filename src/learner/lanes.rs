@@ -73,13 +73,30 @@ pub fn all<S: Simd>(simd: S, value: f64) -> Lanes<S> {
 /// a b + c, rounded once.
 #[inline(always)]
 pub fn fused<S: Simd>(a: Lanes<S>, b: Lanes<S>, c: Lanes<S>) -> Lanes<S> {
-    a.mul_add_precise(b, c)
+    if !fuses(a.simd.level()) {
+        return fused_one_by_one([a.into(), b.into(), c.into()]).simd_into(a.simd);
+    }
+    a.mul_add(b, c)
+}
+
+/// Whether a vector unit multiplies and adds at once; known when code is compiled for it.
+#[inline(always)]
+fn fuses(level: Level) -> bool {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    return level.as_avx2().is_some();
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    return !level.is_fallback();
+}
+
+#[cold]
+fn fused_one_by_one([a, b, c]: [[f64; LANES]; 3]) -> [f64; LANES] {
+    std::array::from_fn(|lane| a[lane].mul_add(b[lane], c[lane]))
 }
 
 /// c − a b, rounded once.
 #[inline(always)]
 pub fn without<S: Simd>(c: Lanes<S>, a: Lanes<S>, b: Lanes<S>) -> Lanes<S> {
-    (-a).mul_add_precise(b, c)
+    fused(-a, b, c)
 }
 
 /// The sum of products.

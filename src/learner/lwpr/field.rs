@@ -42,7 +42,8 @@ pub struct Regression {
     pub projections: Vec<Projection>,
 }
 
-/// One projection.
+/// One projection. Of what it fits, only the sums are kept that the rest follows from: the
+/// direction [`u`](Self::u), the slope [`beta`](Self::beta), and [`p`](Self::p).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Projection {
@@ -59,20 +60,18 @@ pub struct Projection {
     pub ss_s2: f64,
     /// The remembered sum of wsy.
     pub ss_y_res: f64,
-    /// The slope β.
-    pub beta: f64,
     /// H: how changes of w act on the slope.
     pub h: f64,
     /// r: how they act on the variance.
     pub r: f64,
-    /// The direction U (n), of length 1.
-    pub u: Vec<f64>,
-    /// P (n): what of the inputs the projection accounts for.
-    pub p: Vec<f64>,
     /// The remembered sum of w s x (n).
     pub ss_x_res: Vec<f64>,
     /// The remembered sum of w x y (n), along which U points.
     pub s_x_res_y_res: Vec<f64>,
+    /// What makes a direction of that sum: 1 over its length, or 0 while it has none.
+    pub per_length: f64,
+    /// The input along which U points until then.
+    pub axis: usize,
 }
 
 /// How many numbers of each kind a field has.
@@ -98,14 +97,10 @@ pub struct Base<T> {
 pub struct ProjectionRows<T> {
     /// The scalars, [`N_DATA`] to [`R`].
     pub scalars: T,
-    /// U (n).
-    pub u: T,
-    /// P (n).
-    pub p: T,
-    /// Σ w s x (n).
-    pub ss_x_res: T,
     /// Σ w x y (n).
     pub s_x_res_y_res: T,
+    /// Σ w s x (n).
+    pub ss_x_res: T,
 }
 
 /// Where 1 says that a field may speak, and 0 that it may not.
@@ -123,23 +118,25 @@ pub const BASE_SCALARS: usize = 5;
 
 /// Where a projection's count of samples is.
 pub const N_DATA: usize = 0;
-/// Where β is.
-pub const BETA: usize = 1;
 /// Where the sum of weights is.
-pub const SUM_W: usize = 2;
+pub const SUM_W: usize = 1;
 /// Where the sum of squared errors is.
-pub const SUM_E_CV2: usize = 3;
-/// Where Σ ws² is.
-pub const SS_S2: usize = 4;
-/// Where λ is.
-pub const LAMBDA: usize = 5;
+pub const SUM_E_CV2: usize = 2;
 /// Where Σ wsy is.
-pub const SS_Y_RES: usize = 6;
+pub const SS_Y_RES: usize = 3;
+/// Where 1 / Σ ws² is.
+pub const PER_S2: usize = 4;
+/// Where 1 over the length of Σ w x y is, or 0.
+pub const PER_LENGTH: usize = 5;
+/// Where Σ ws² is.
+pub const SS_S2: usize = 6;
+/// Where λ is.
+pub const LAMBDA: usize = 7;
 /// Where H is.
-pub const H: usize = 7;
+pub const H: usize = 8;
 /// Where r is.
-pub const R: usize = 8;
-const PROJECTION_SCALARS: usize = 9;
+pub const R: usize = 9;
+const PROJECTION_SCALARS: usize = 10;
 
 impl Size {
     /// The rows of the metric, which come first.
@@ -159,12 +156,7 @@ impl Size {
 
     /// The rows of a projection. All projections come last.
     pub fn projection(self) -> usize {
-        padded(PROJECTION_SCALARS + 4 * self.inputs)
-    }
-
-    /// As many of them, from the first on, as predictions need.
-    pub fn projection_to_predict(self) -> usize {
-        PROJECTION_SCALARS + 2 * self.inputs
+        padded(PROJECTION_SCALARS + 2 * self.inputs)
     }
 
     /// All rows of a field with so many projections.
@@ -199,24 +191,13 @@ impl Size {
         Base { scalars, mean, var }
     }
 
-    /// Cuts as many rows of a projection as predictions need into scalars, U and P.
-    #[inline(always)]
-    pub fn cut_to_predict<T: Cut>(self, rows: T) -> (T, T, T) {
-        let (scalars, rest) = rows.cut(PROJECTION_SCALARS);
-        let (u, rest) = rest.cut(self.inputs);
-        let (p, _) = rest.cut(self.inputs);
-        (scalars, u, p)
-    }
-
     /// Cuts the rows of a projection.
     #[inline(always)]
     pub fn cut_projection<T: Cut>(self, rows: T) -> ProjectionRows<T> {
         let (scalars, rest) = rows.cut(PROJECTION_SCALARS);
-        let (u, rest) = rest.cut(self.inputs);
-        let (p, rest) = rest.cut(self.inputs);
-        let (ss_x_res, rest) = rest.cut(self.inputs);
-        let (s_x_res_y_res, _) = rest.cut(self.inputs);
-        ProjectionRows { scalars, u, p, ss_x_res, s_x_res_y_res }
+        let (s_x_res_y_res, rest) = rest.cut(self.inputs);
+        let (ss_x_res, _) = rest.cut(self.inputs);
+        ProjectionRows { scalars, s_x_res_y_res, ss_x_res }
     }
 }
 
@@ -224,7 +205,6 @@ impl Projection {
     /// A projection at its birth, along `axis`.
     pub fn new(axis: usize, settings: &Settings) -> Self {
         let n = settings.inputs;
-        let along: Vec<f64> = (0..n).map(|i| if i == axis { 1.0 } else { 0.0 }).collect();
         Self {
             n_data: NEARLY_NOTHING,
             lambda: settings.init_lambda,
@@ -232,19 +212,37 @@ impl Projection {
             sum_e_cv2: 0.0,
             ss_s2: settings.init_s2,
             ss_y_res: 0.0,
-            beta: 0.0,
             h: 0.0,
             r: 0.0,
-            u: along.clone(),
-            p: along,
             ss_x_res: vec![0.0; n],
             s_x_res_y_res: vec![0.0; n],
+            per_length: 0.0,
+            axis,
         }
     }
 
-    fn from_column(n: usize, numbers: &[f64]) -> Self {
+    /// The direction U (n), of length 1.
+    pub fn u(&self) -> Vec<f64> {
+        if self.per_length > 0.0 {
+            self.s_x_res_y_res.iter().map(|sum| sum * self.per_length).collect()
+        } else {
+            (0..self.s_x_res_y_res.len()).map(|i| f64::from(u8::from(i == self.axis))).collect()
+        }
+    }
+
+    /// P (n): what of the inputs the projection accounts for.
+    pub fn p(&self) -> Vec<f64> {
+        let per_s2 = 1.0 / self.ss_s2;
+        self.ss_x_res.iter().map(|sum| sum * per_s2).collect()
+    }
+
+    /// The slope β.
+    pub fn beta(&self) -> f64 {
+        self.ss_y_res / self.ss_s2
+    }
+
+    fn from_column((n, axis): (usize, usize), numbers: &[f64]) -> Self {
         let (scalars, vectors) = numbers.split_at(PROJECTION_SCALARS);
-        let vector = |k: usize| vectors[k * n..][..n].to_vec();
         Self {
             n_data: scalars[N_DATA],
             lambda: scalars[LAMBDA],
@@ -252,28 +250,31 @@ impl Projection {
             sum_e_cv2: scalars[SUM_E_CV2],
             ss_s2: scalars[SS_S2],
             ss_y_res: scalars[SS_Y_RES],
-            beta: scalars[BETA],
             h: scalars[H],
             r: scalars[R],
-            u: vector(0),
-            p: vector(1),
-            ss_x_res: vector(2),
-            s_x_res_y_res: vector(3),
+            ss_x_res: vectors[n..2 * n].to_vec(),
+            s_x_res_y_res: vectors[..n].to_vec(),
+            per_length: scalars[PER_LENGTH],
+            axis,
         }
     }
 
     /// The numbers of this projection, in the order of its rows.
     pub fn to_column(&self) -> Vec<f64> {
-        let Self { n_data, lambda, sum_w, sum_e_cv2, ss_s2, ss_y_res, beta, h, r, .. } = *self;
-        let scalars = [n_data, beta, sum_w, sum_e_cv2, ss_s2, lambda, ss_y_res, h, r];
-        let vectors = [&self.u[..], &self.p, &self.ss_x_res, &self.s_x_res_y_res].concat();
-        filled_up([&scalars[..], &vectors].concat())
+        let Self { n_data, lambda, sum_w, sum_e_cv2, ss_s2, ss_y_res, h, r, per_length, .. } =
+            *self;
+        let per_s2 = 1.0 / ss_s2;
+        let scalars =
+            [n_data, sum_w, sum_e_cv2, ss_y_res, per_s2, per_length, ss_s2, lambda, h, r];
+        filled_up([&scalars[..], &self.s_x_res_y_res, &self.ss_x_res].concat())
     }
 
-    fn is_sound(&self, n: usize) -> bool {
-        let vectors = [&self.u, &self.p, &self.ss_x_res, &self.s_x_res_y_res];
-        vectors.into_iter().all(|vector| vector.len() == n)
+    fn is_sound(&self, n: usize, axis: usize) -> bool {
+        self.ss_x_res.len() == n
+            && self.s_x_res_y_res.len() == n
             && all_finite(&self.to_column())
+            && self.per_length >= 0.0
+            && self.axis == axis
             && 0.0 < self.lambda
             && self.lambda <= 1.0
     }
@@ -299,9 +300,9 @@ impl Regression {
         let mut residual: Vec<f64> = x.iter().zip(&self.mean).map(|(x, mean)| x - mean).collect();
         let mut y = self.offset;
         for projection in &self.projections[..self.counting()] {
-            let s: f64 = projection.u.iter().zip(&residual).map(|(u, x)| u * x).sum();
-            y += projection.beta * s;
-            residual.iter_mut().zip(&projection.p).for_each(|(x, p)| *x -= p * s);
+            let s: f64 = projection.u().iter().zip(&residual).map(|(u, x)| u * x).sum();
+            y += projection.beta() * s;
+            residual.iter_mut().zip(projection.p()).for_each(|(x, p)| *x -= p * s);
         }
         y
     }
@@ -323,7 +324,8 @@ impl Field {
         let (base, rest) = rest.split_at(size.base());
         let mut projections: Vec<_> = rest
             .chunks_exact(size.projection())
-            .map(|numbers| Projection::from_column(n, numbers))
+            .enumerate()
+            .map(|(axis, numbers)| Projection::from_column((n, axis), numbers))
             .collect();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
         projections.truncate(base[COUNT] as usize);
@@ -359,7 +361,7 @@ impl Field {
         (1..=n).contains(&regression.projections.len())
             && regression.mean.len() == n
             && regression.var.len() == n
-            && regression.projections.iter().all(|projection| projection.is_sound(n))
+            && regression.projections.iter().zip(0..).all(|(one, axis)| one.is_sound(n, axis))
             && metric.is_sound(size.entries)
             && all_finite(&self.to_column())
     }

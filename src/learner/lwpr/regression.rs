@@ -3,7 +3,8 @@
 use fearless_simd::prelude::*;
 
 use super::field::{
-    BASE_SCALARS, BETA, Base, COUNT, H, LAMBDA, N_DATA, NEARLY_NOTHING, OFFSET, ProjectionRows, R, SS_P, SS_S2,
+    BASE_SCALARS, Base, COUNT, H, LAMBDA, N_DATA, NEARLY_NOTHING, OFFSET, PER_LENGTH, PER_S2,
+    ProjectionRows, R, SS_P, SS_S2,
     SS_Y_RES, SUM_E_CV2, SUM_E2, SUM_W, Size, TRUSTWORTHY,
 };
 use super::settings::Settings;
@@ -233,16 +234,16 @@ impl<'a, S: Simd> Speech<'a, S> {
     /// Adds what projection `j` says, by as many of its rows as predictions need.
     #[inline(always)]
     pub fn hear(&mut self, simd: S, j: usize, rows: &[Row]) {
-        let (scalars, u, p) = self.size.cut_to_predict(rows);
-        let counts = counts(self.size, self.count - count(j), scalars[N_DATA].get(simd));
-        let s = counts.select(dot(simd, u, self.residual), all(simd, 0.0));
-        self.y = fused(scalars[BETA].get(simd), s, self.y);
-        self.leverage += s * s / scalars[SS_S2].get(simd);
-        for (residual, p) in self.residual.iter_mut().zip(p) {
-            residual.set(without(residual.get(simd), p.get(simd), s));
-        }
+        let projection = self.size.cut_projection(rows);
+        let counts = counts(self.size, self.count - count(j), projection.scalar(simd, N_DATA));
+        let s = counts.select(projection.see(simd, j, self.residual), all(simd, 0.0));
+        let pull = s * projection.scalar(simd, PER_S2);
+        self.y = fused(projection.scalar(simd, SS_Y_RES), pull, self.y);
+        self.leverage = fused(s, pull, self.leverage);
+        projection.account(simd, pull, self.residual);
         let heard = if j == 0 { Mask::splat(simd, true) } else { counts };
-        let (errors, sum_w) = (scalars[SUM_E_CV2].get(simd), scalars[SUM_W].get(simd));
+        let (errors, sum_w) =
+            (projection.scalar(simd, SUM_E_CV2), projection.scalar(simd, SUM_W));
         self.spread = (heard.select(errors, self.spread.0), heard.select(sum_w, self.spread.1));
     }
 
@@ -303,8 +304,9 @@ impl Rows<&mut [Row]> {
         for j in 0..old.depth() {
             let before = old.projection(j);
             let has = old.has(simd, j);
-            let s = has.select(dot(simd, before.u, &found.residual[..old.size.inputs]), zero);
-            fitted = fused(before.scalar(simd, BETA), s, fitted);
+            let s = has.select(before.see(simd, j, &found.residual[..old.size.inputs]), zero);
+            let pull = s * before.scalar(simd, PER_S2);
+            fitted = fused(before.scalar(simd, SS_Y_RES), pull, fitted);
             forgetting = has.select(before.scalar(simd, LAMBDA), forgetting);
             let heard = (given.w, s, target);
             let residual = (&mut found.residual[..old.size.inputs], settings);
@@ -371,13 +373,14 @@ impl Rows<&mut [Row]> {
             }
             for j in 0..old.depth() {
                 let (projection, before) = (new.projection(j), old.projection(j));
-                let s = dot(simd, projection.u, &found.residual[..old.size.inputs]);
+                let residual = &mut found.residual[..old.size.inputs];
+                let s = projection.see(simd, j, residual);
+                let pull = s * projection.scalar(simd, PER_S2);
                 found.s[j].set(s);
-                for (residual, p) in found.residual.iter_mut().zip(projection.p) {
-                    residual.set(without(residual.get(simd), p.get(simd), s));
-                }
+                projection.account(simd, pull, residual);
                 let counts = old.counts(simd, j, before.scalar(simd, N_DATA));
-                fitted += counts.select(projection.scalar(simd, BETA) * s, zero);
+                let said = projection.scalar(simd, SS_Y_RES) * pull;
+                fitted += counts.select(said, zero);
                 e_cv = counts.select(found.e_cvs[j].get(simd), e_cv);
             }
         }
@@ -452,6 +455,22 @@ impl ProjectionRows<&[Row]> {
     pub fn scalar<S: Simd>(&self, simd: S, at: usize) -> Lanes<S> {
         self.scalars[at].get(simd)
     }
+
+    /// s: what lies along the directions of projection `j`.
+    #[inline(always)]
+    fn see<S: Simd>(&self, simd: S, j: usize, residual: &[Row]) -> Lanes<S> {
+        let per_length = self.scalar(simd, PER_LENGTH);
+        let along = dot(simd, self.s_x_res_y_res, residual) * per_length;
+        per_length.simd_gt(0.0).select(along, residual[j].get(simd))
+    }
+
+    /// Takes off `residual` what the projection accounts for, where `pull` is s / Σ ws².
+    #[inline(always)]
+    fn account<S: Simd>(&self, simd: S, pull: Lanes<S>, residual: &mut [Row]) {
+        for (residual, sum) in residual.iter_mut().zip(self.ss_x_res) {
+            residual.set(without(residual.get(simd), sum.get(simd), pull));
+        }
+    }
 }
 
 impl ProjectionRows<&mut [Row]> {
@@ -474,32 +493,30 @@ impl ProjectionRows<&mut [Row]> {
         self.scalars[SUM_W].set(fused(lambda, before.scalar(simd, SUM_W), w));
         self.scalars[SS_S2].set(ss_s2);
         self.scalars[SS_Y_RES].set(ss_y_res);
-        self.scalars[BETA].set(ss_y_res * per_s2);
+        self.scalars[PER_S2].set(per_s2);
         let (tau, end) = (settings.tau_lambda, settings.final_lambda);
         self.scalars[N_DATA].set(before.scalar(simd, N_DATA) * lambda + 1.0);
         self.scalars[LAMBDA].set(lambda * tau + end * (1.0 - tau));
         (self.scalars[H], self.scalars[R]) = (before.scalars[H], before.scalars[R]);
         let kept = lambda * 0.1 + 0.9;
         let mut square = all(simd, 0.0);
-        let before_sums = before.s_x_res_y_res.iter().zip(before.ss_x_res).zip(before.p);
-        let sums = self.s_x_res_y_res.iter_mut().zip(self.ss_x_res).zip(self.p);
-        for ((((turned, sum), p), ((old_turned, old_sum), old_p)), residual) in
+        let passed = s * before.scalar(simd, PER_S2);
+        let before_sums = before.s_x_res_y_res.iter().zip(before.ss_x_res);
+        let sums = self.s_x_res_y_res.iter_mut().zip(self.ss_x_res);
+        for (((turned, sum), (old_turned, old_sum)), residual) in
             sums.zip(before_sums).zip(residual)
         {
-            let x = residual.get(simd);
+            let (x, old_sum) = (residual.get(simd), old_sum.get(simd));
             let along = fused(kept, old_turned.get(simd), turning * x);
             square = fused(along, along, square);
             turned.set(along);
-            let accounted = fused(lambda, old_sum.get(simd), pull * x);
-            sum.set(accounted);
-            p.set(accounted * per_s2);
-            residual.set(without(x, old_p.get(simd), s));
+            sum.set(fused(lambda, old_sum, pull * x));
+            residual.set(without(x, old_sum, passed));
         }
         let turns = square.simd_gt(LEAST_SQUARE);
         let per_length = all(simd, 1.0) / square.sqrt();
-        for ((u, old), sum) in self.u.iter_mut().zip(before.u).zip(&*self.s_x_res_y_res) {
-            u.set(turns.select(sum.get(simd) * per_length, old.get(simd)));
-        }
+        let before = before.scalar(simd, PER_LENGTH);
+        self.scalars[PER_LENGTH].set(turns.select(per_length, before));
         per_s2
     }
 }

@@ -133,23 +133,9 @@ fn most(counts: Row) -> usize {
 impl Work for Teach<'_> {
     type Output = (Voices, [Near; 2]);
 
-    /// Common sizes come as constants, with which loops are unrolled.
     #[inline(always)]
-    fn with<S: Simd>(self, simd: S) -> Self::Output {
-        let Size { inputs, entries } = self.shop.size;
-        match (inputs, entries) {
-            (2, 2) => self.teach_all(simd, Size { inputs: 2, entries: 2 }),
-            (2, 3) => self.teach_all(simd, Size { inputs: 2, entries: 3 }),
-            (4, 4) => self.teach_all(simd, Size { inputs: 4, entries: 4 }),
-            (4, 10) => self.teach_all(simd, Size { inputs: 4, entries: 10 }),
-            _ => self.teach_all(simd, Size { inputs, entries }),
-        }
-    }
-}
-
-impl Teach<'_> {
-    #[inline(always)]
-    fn teach_all<S: Simd>(mut self, simd: S, size: Size) -> (Voices, [Near; 2]) {
+    fn with<S: Simd>(mut self, simd: S) -> Self::Output {
+        let size = self.shop.size;
         let (window, zero) = (self.shop.window, all(simd, 0.0));
         let (mut sum_w, mut sum_wy) = (zero, zero);
         let mut search = Search::new(simd, self.fields.gathers());
@@ -165,6 +151,10 @@ impl Teach<'_> {
         let voices = Voices { sum_w: total(sum_w), sum_wy: total(sum_wy), ..Voices::default() };
         (voices, window.strongest(simd, search.nearest()))
     }
+}
+
+impl Teach<'_> {
+
 
     /// Lets the active ones of eight fields learn the sample: regression first and then
     /// shape. Each part is learned aside, and taken over where it is sound. Leaves what the
@@ -342,7 +332,7 @@ impl Consult<'_> {
             let mut speech = Speech::begin(simd, size, base, (x, residual));
             let speaking = window.counts(w) & speech.trustworthy;
             for j in 0..most(base[COUNT]) {
-                let range = size.height(j)..size.height(j) + size.projection_to_predict();
+                let range = size.height(j)..size.height(j + 1);
                 speech.hear(simd, j, fields.rows(simd, &eight, range, room));
             }
             sum_w += speaking.select(w, zero);

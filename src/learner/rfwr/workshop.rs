@@ -120,23 +120,9 @@ impl Workshop {
 impl Work for Teach<'_> {
     type Output = Taught;
 
-    /// Common sizes come as constants, with which loops are unrolled.
     #[inline(always)]
-    fn with<S: Simd>(self, simd: S) -> Taught {
-        let Size { inputs, outputs, entries } = self.shop.size;
-        match (inputs, outputs, entries) {
-            (2, 1, 2) => self.teach_all(simd, Size { inputs: 2, outputs: 1, entries: 2 }),
-            (2, 1, 3) => self.teach_all(simd, Size { inputs: 2, outputs: 1, entries: 3 }),
-            (4, 1, 4) => self.teach_all(simd, Size { inputs: 4, outputs: 1, entries: 4 }),
-            (4, 1, 10) => self.teach_all(simd, Size { inputs: 4, outputs: 1, entries: 10 }),
-            _ => self.teach_all(simd, Size { inputs, outputs, entries }),
-        }
-    }
-}
-
-impl Teach<'_> {
-    #[inline(always)]
-    fn teach_all<S: Simd>(mut self, simd: S, size: Size) -> Taught {
+    fn with<S: Simd>(mut self, simd: S) -> Taught {
+        let size = self.shop.size;
         let (window, zero) = (self.shop.window, all(simd, 0.0));
         let mut voices = zero;
         self.shop.voices.fill(Row::ZERO);
@@ -153,6 +139,10 @@ impl Teach<'_> {
         }
         Taught { voices: total(voices), strongest: window.strongest(simd, search.nearest()) }
     }
+}
+
+impl Teach<'_> {
+
 
     /// Lets the active ones of eight fields learn the sample: regression first and then
     /// shape. Each part is learned aside, and taken over where it is sound. Adds what the
