@@ -147,7 +147,7 @@ pub fn run<W: Work>(level: Level, work: W) -> W::Output {
     dispatch!(level, simd => work.with(simd))
 }
 
-/// e to the `x`, for `x` from −700 to 700; beyond it as at these ends. At most one unit in
+/// e to the `x`, for `x` from −700 to 700; beyond it as at these ends. At most two units in
 /// the last place off. NaN gives NaN.
 ///
 /// x = k ln 2 + r with |r| ≤ ln 2 / 2, and e^r by its Taylor series up to r¹³/13!, whose
@@ -239,11 +239,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn exp_is_exact_to_the_last_place_but_one(x in prop::array::uniform8(-700.0..700.0)) {
+        fn exp_is_exact_to_two_units_in_the_last_place(x in prop::array::uniform8(-700.0..700.0)) {
             let ours = run(Level::new(), Exp(x));
             prop_assert_eq!(ours, run(Level::baseline(), Exp(x)), "all vector units agree");
             for (ours, x) in ours.into_iter().zip(x) {
-                prop_assert!((ours / x.exp() - 1.0).abs() <= 2.3e-16, "exp({x}) = {ours}");
+                prop_assert!((ours / x.exp() - 1.0).abs() <= 4.5e-16, "exp({x}) = {ours}");
             }
         }
     }

@@ -54,36 +54,38 @@ impl<S: Simd> Search<S> {
             let block = self.block;
             self.block += 1;
             let q = shapes.distance(simd, block, x);
-            self.nearest.note(block, q);
             let near = window.may_count(q);
             if self.gathers {
                 self.keep(block, near, q);
             } else if near.any_true() {
-                let mut eight = [block * LANES; LANES];
-                for (lane, field) in eight.iter_mut().enumerate() {
-                    *field += lane;
-                }
-                return Some(Group { eight, q });
+                let fields = fields(simd, block);
+                self.nearest.note(fields, q);
+                return Some(Group { eight: indices(fields), q });
             }
         }
         Some(self.hand_out(simd))
     }
 
-    /// The two nearest of the fields looked at.
+    /// The two nearest of all fields, which are among those handed out, if these are two.
     #[inline(always)]
-    pub fn nearest(self) -> [Near; 2] {
-        self.nearest.settle()
+    pub fn nearest(self, simd: S, shapes: &Shapes, x: &[f64]) -> [Near; 2] {
+        match self.nearest.settle() {
+            [None, _] => nearest_of_all(simd, shapes, x),
+            // Its own metric may have been learned since, but not that of any other.
+            [Some(first), None] => {
+                let other = |near: &Near| near.is_some_and(|(field, _)| field != first.0);
+                let next = nearest_of_all(simd, shapes, x).into_iter().find(other);
+                [Some(first), next.flatten()]
+            }
+            two => two,
+        }
     }
 
     /// Keeps the block's fields where the mask is true.
     #[inline(always)]
     fn keep(&mut self, block: usize, mask: Mask<S>, q: Lanes<S>) {
-        const PLACES: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
-        #[expect(clippy::cast_precision_loss, reason = "exact below 2⁵³ fields")]
-        let first = (block * LANES) as f64;
-        let fields: Lanes<S> = PLACES.simd_into(q.simd);
-        let fields = (fields + first).compress(mask);
         let end = self.count + LANES;
+        let fields = fields(q.simd, block).compress(mask);
         self.found[self.count..end].copy_from_slice(&Row(fields.into()).0);
         self.q[self.count..end].copy_from_slice(&Row(q.compress(mask).into()).0);
         self.count += mask.to_bitmask().count_ones() as usize;
@@ -105,24 +107,56 @@ impl<S: Simd> Search<S> {
     /// The first eight of those found.
     #[inline(always)]
     fn hand_out(&mut self, simd: S) -> Group<S> {
-        let (mut eight, mut q) = ([0; LANES], [0.0; LANES]);
+        let (mut fields, mut q) = (Row::ZERO, Row::ZERO);
         for lane in 0..LANES {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a field")]
-            let field = self.found[lane] as usize;
-            (eight[lane], q[lane]) = (field, self.q[lane]);
+            (fields.0[lane], q.0[lane]) = (self.found[lane], self.q[lane]);
             self.found[lane] = self.found[LANES + lane];
             self.q[lane] = self.q[LANES + lane];
         }
         self.count -= LANES;
-        Group { eight, q: q.simd_into(simd) }
+        let (fields, q) = (fields.get(simd), q.get(simd));
+        self.nearest.note(fields, q);
+        Group { eight: indices(fields), q }
     }
 }
 
+/// The fields of a block, as numbers.
+#[inline(always)]
+fn fields<S: Simd>(simd: S, block: usize) -> Lanes<S> {
+    const LANE: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+    #[expect(clippy::cast_precision_loss, reason = "exact below 2⁵³ fields")]
+    let first = (block * LANES) as f64;
+    let lane: Lanes<S> = LANE.simd_into(simd);
+    lane + first
+}
+
+/// Fields as indices.
+#[inline(always)]
+fn indices<S: Simd>(fields: Lanes<S>) -> Eight {
+    let (mut eight, Row(fields)) = ([0; LANES], Row(fields.into()));
+    for (index, field) in eight.iter_mut().zip(fields) {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
+        let field = field as usize;
+        *index = field;
+    }
+    eight
+}
+
+/// The two nearest fields, wherever they are.
+#[cold]
+fn nearest_of_all<S: Simd>(simd: S, shapes: &Shapes, x: &[f64]) -> [Near; 2] {
+    let mut nearest = Nearest::none(simd);
+    for block in 0..shapes.blocks() {
+        nearest.note(fields(simd, block), shapes.distance(simd, block, x));
+    }
+    nearest.settle()
+}
+
 /// The two fields nearest in their own metrics; of equally near ones the earlier is ahead.
-/// Each lane keeps its own two until [`settle`](Self::settle).
+/// Each lane keeps its own two until [`settle`](Self::settle), of fields noted in their order.
 #[derive(Clone, Copy, Debug)]
-pub struct Nearest<S: Simd> {
-    /// The smallest q of a lane and the block that it is in,
+struct Nearest<S: Simd> {
+    /// The smallest q of a lane and whose it is,
     first: (Lanes<S>, Lanes<S>),
     /// and the next.
     second: (Lanes<S>, Lanes<S>),
@@ -134,51 +168,54 @@ pub type Near = Option<(usize, f64)>;
 impl<S: Simd> Nearest<S> {
     /// Nobody yet.
     #[inline(always)]
-    pub fn none(simd: S) -> Self {
-        let nobody = (all(simd, f64::INFINITY), all(simd, -1.0));
+    fn none(simd: S) -> Self {
+        let nobody = (all(simd, f64::INFINITY), all(simd, 0.0));
         Self { first: nobody, second: nobody }
     }
 
-    /// Takes note of a block's fields at `q`; a NaN distance is no distance.
+    /// Takes note of fields at `q`; a distance that is NaN or infinite is none.
     #[inline(always)]
-    pub fn note(&mut self, block: usize, q: Lanes<S>) {
-        #[expect(clippy::cast_precision_loss, reason = "exact below 2⁵³ blocks")]
-        let here = all(q.simd, block as f64);
+    fn note(&mut self, fields: Lanes<S>, q: Lanes<S>) {
         let ahead = q.simd_lt(self.first.0);
         let next = q.simd_lt(self.second.0);
         self.second.0 = ahead.select(self.first.0, next.select(q, self.second.0));
-        self.second.1 = ahead.select(self.first.1, next.select(here, self.second.1));
+        self.second.1 = ahead.select(self.first.1, next.select(fields, self.second.1));
         self.first.0 = ahead.select(q, self.first.0);
-        self.first.1 = ahead.select(here, self.first.1);
+        self.first.1 = ahead.select(fields, self.first.1);
     }
 
     /// The nearest of all lanes, and the next.
     #[inline(always)]
-    pub fn settle(self) -> [Near; 2] {
-        let mut two: [Near; 2] = [None; 2];
-        for (q, block) in [self.first, self.second] {
-            let (Row(q), Row(block)) = (Row(q.into()), Row(block.into()));
-            for lane in 0..LANES {
-                if block[lane] < 0.0 {
-                    continue;
-                }
-                #[expect(clippy::cast_possible_truncation, reason = "a block's index")]
-                #[expect(clippy::cast_sign_loss, reason = "checked above")]
-                let near = (block[lane] as usize * LANES + lane, q[lane]);
-                if is_ahead(near, two[0]) {
-                    two = [Some(near), two[0]];
-                } else if is_ahead(near, two[1]) {
-                    two[1] = Some(near);
-                }
-            }
-        }
-        two
+    fn settle(self) -> [Near; 2] {
+        let (mut q, mut fields) = (Row(self.first.0.into()), Row(self.first.1.into()));
+        let (next_q, next) = (Row(self.second.0.into()), Row(self.second.1.into()));
+        let lane = least(&q, &fields);
+        let first = near(q.0[lane], fields.0[lane]);
+        // Its lane's next is up against the first of the others.
+        (q.0[lane], fields.0[lane]) = (next_q.0[lane], next.0[lane]);
+        let lane = least(&q, &fields);
+        [first, near(q.0[lane], fields.0[lane])]
     }
 }
 
 #[inline(always)]
-fn is_ahead(near: (usize, f64), other: Near) -> bool {
-    other.is_none_or(|other| near.1 < other.1 || near.1 == other.1 && near.0 < other.0)
+fn near(q: f64, field: f64) -> Near {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
+    let field = field as usize;
+    q.is_finite().then_some((field, q))
+}
+
+/// The lane of the nearest of eight, of equally near ones the earliest.
+#[inline(always)]
+fn least(Row(q): &Row, Row(fields): &Row) -> usize {
+    let mut best = 0;
+    for lane in 1..LANES {
+        let earlier = q[lane] == q[best] && fields[lane] < fields[best];
+        if q[lane] < q[best] || earlier {
+            best = lane;
+        }
+    }
+    best
 }
 
 #[cfg(test)]
@@ -197,7 +234,7 @@ mod tests {
         fn with<S: Simd>(self, simd: S) -> [Near; 2] {
             let mut nearest = Nearest::none(simd);
             for (block, q) in self.0.into_iter().enumerate() {
-                nearest.note(block, q.simd_into(simd));
+                nearest.note(fields(simd, block), q.simd_into(simd));
             }
             nearest.settle()
         }

@@ -107,8 +107,9 @@ impl Store {
         }
     }
 
-    /// The numbers of `range`, which starts at a multiple of four, of eight fields. `room` is
-    /// for them, and up to three others, where they do not lie ready.
+    /// As many numbers of eight fields as there is room, of which those of `range` are valid;
+    /// it starts at a multiple of four. The room, which is a multiple of four too, is used
+    /// where they do not lie ready.
     #[inline(always)]
     pub fn rows<'a, S: Simd>(
         &'a self,
@@ -122,7 +123,9 @@ impl Store {
                 records.gather(simd, eight, range, room);
                 room
             }
-            Self::Columns(columns) => &columns.block(eight[0] / LANES)[range],
+            Self::Columns(columns) => {
+                &columns.block(eight[0] / LANES)[range.start..][..room.len()]
+            }
         }
     }
 

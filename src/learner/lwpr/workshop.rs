@@ -15,6 +15,7 @@ use crate::learner::kernel::{Activation, Window};
 use crate::learner::lanes::{Eight, LANES, Lanes, Mask, Row, Work, all, finite, total};
 use crate::learner::metric::{Descent, Metric, Oversized, Rules};
 use crate::learner::near::{Group, Near, Search};
+use crate::learner::records::padded;
 use crate::learner::sample::Sample;
 use crate::learner::settings::MAX_INPUTS;
 use crate::learner::shapes::Shapes;
@@ -149,7 +150,7 @@ impl Work for Teach<'_> {
             sum_wy += heard * self.shop.found.y.get(simd);
         }
         let voices = Voices { sum_w: total(sum_w), sum_wy: total(sum_wy), ..Voices::default() };
-        (voices, window.strongest(simd, search.nearest()))
+        (voices, window.strongest(simd, search.nearest(simd, self.shapes, &self.shop.sample.x)))
     }
 }
 
@@ -228,7 +229,7 @@ impl Teach<'_> {
         let depth = old.depth();
         let memories = (&reckoning.h[..depth], &reckoning.r[..depth]);
         let learned = rules.learned(size.entries);
-        let old_metric = self.fields.rows(simd, &eight, 0..start, room);
+        let old_metric = self.fields.rows(simd, &eight, 0..learned, room);
         let new_d = &mut d.1[..size.entries];
         let mask = rules.descend(simd, (old_metric, &mut *metric), new_d, (&by, mask));
         let mask = finite(simd, finite(simd, mask, memories.0), memories.1);
@@ -300,7 +301,7 @@ pub struct Consult<'a> {
 
 /// Room for what predictions need of so many inputs: a base or a projection, with its scalars.
 const fn room_for(inputs: usize) -> usize {
-    2 * inputs + 12
+    padded(2 * inputs + 10)
 }
 
 impl Work for Consult<'_> {
@@ -328,11 +329,12 @@ impl Consult<'_> {
         while let Some(Group { eight, q }) = search.next(simd, (shapes, window), x) {
             let w = window.activation(q);
             let range = size.metric()..size.metric() + size.base_to_predict();
-            let base = fields.rows(simd, &eight, range, room);
+            let base = fields.rows(simd, &eight, range, &mut room[..size.base()]);
             let mut speech = Speech::begin(simd, size, base, (x, residual));
             let speaking = window.counts(w) & speech.trustworthy;
             for j in 0..most(base[COUNT]) {
                 let range = size.height(j)..size.height(j + 1);
+                let room = &mut room[..size.projection()];
                 speech.hear(simd, j, fields.rows(simd, &eight, range, room));
             }
             sum_w += speaking.select(w, zero);
@@ -342,7 +344,7 @@ impl Consult<'_> {
                 sum_wy2 += speaking.select(w * squares, zero);
             }
         }
-        let [first, _] = window.strongest(simd, search.nearest());
+        let [first, _] = window.strongest(simd, search.nearest(simd, shapes, x));
         Voices {
             sum_w: total(sum_w),
             sum_wy: total(sum_wy),

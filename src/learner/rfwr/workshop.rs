@@ -137,7 +137,7 @@ impl Work for Teach<'_> {
         for (sum, rows) in self.shop.blend.iter_mut().zip(&self.shop.voices) {
             *sum = total(rows.get(simd));
         }
-        Taught { voices: total(voices), strongest: window.strongest(simd, search.nearest()) }
+        Taught { voices: total(voices), strongest: window.strongest(simd, search.nearest(simd, self.shapes, &self.shop.sample.x)) }
     }
 }
 
@@ -156,6 +156,7 @@ impl Teach<'_> {
     ) -> Lanes<S> {
         let activation = self.shop.window.derivatives(w, self.weight);
         let Workshop { sample, room, next, found, voices, .. } = &mut *self.shop;
+        let room = &mut room[..size.regression()];
         let rows = self.fields.rows(simd, &eight, 0..size.regression(), room);
         let old = size.cut_regression(rows);
         let (next, ..) = size.cut(&mut next[..]);
@@ -209,7 +210,7 @@ impl Teach<'_> {
         let start = size.regression();
         let lambda = self.fields.row(&eight, LAMBDA).get(simd);
         let (_, room) = room.split_at_mut(start);
-        let old = self.fields.rows(simd, &eight, start..size.height(), room);
+        let old = self.fields.rows(simd, &eight, start..start + learned, room);
         let (old_errors, old_metric) = old.split_at(errors.len());
         let heard = Heard {
             lambda,
@@ -293,6 +294,7 @@ impl Consult<'_> {
         let zero = all(simd, 0.0);
         let mut voices = zero;
         y.fill(0.0);
+        let (head, output) = (&mut head[..size.head()], &mut output[..size.output()]);
         let mut search = Search::new(simd, fields.gathers());
         while let Some(Group { eight, q }) = search.next(simd, (shapes, window), x) {
             let w = window.activation(q);
@@ -308,6 +310,6 @@ impl Consult<'_> {
                 start += size.output();
             }
         }
-        Taught { voices: total(voices), strongest: window.strongest(simd, search.nearest()) }
+        Taught { voices: total(voices), strongest: window.strongest(simd, search.nearest(simd, shapes, x)) }
     }
 }
