@@ -80,6 +80,8 @@ pub struct Setup {
     pub update_d: bool,
     pub meta: bool,
     pub bi_square: bool,
+    /// P of new fields, RFWR; the published 1e10 costs the first updates ten digits.
+    pub init_p: f64,
     /// Whether what this crate adds to the publications is on.
     pub limited: bool,
 }
@@ -92,8 +94,8 @@ pub fn setups() -> impl Strategy<Value = Setup> {
     let sizes = (1..=3_usize, 1..=3_usize);
     (any::<[bool; 5]>(), sizes).prop_map(|(switches, (inputs, outputs))| {
         let [is_lwpr, diag_only, meta, bi_square, limited] = switches;
-        let update_d = true;
-        Setup { is_lwpr, inputs, outputs, diag_only, update_d, meta, bi_square, limited }
+        let (update_d, init_p) = (true, 1e10);
+        Setup { is_lwpr, inputs, outputs, diag_only, update_d, meta, bi_square, init_p, limited }
     })
 }
 
@@ -119,6 +121,7 @@ impl Setup {
             meta: self.meta,
             init_d: rfwr::InitialMetric::Scalar(3.0),
             init_alpha: 50.0,
+            init_p: self.init_p,
             max_fields: self.limited.then_some(MOST_FIELDS),
             output_limit: limit(LIMIT),
             d_floor: limit(0.01),
