@@ -116,8 +116,8 @@ proptest! {
         let before = stored(&model);
         prop_assert!(serde_json::from_str::<Model>(&before).is_ok());
         check_queries(&model, setup, &queries)?;
-        let seen: Vec<_> = samples.iter().map(|sample| [sample.x[0], sample.x[1], sample.x[2]]).collect();
-        check_queries(&model, setup, &seen)?;
+        let seen = samples.iter().map(|Sample { x, .. }| [x[0], x[1], x[2]]);
+        check_queries(&model, setup, &seen.collect::<Vec<_>>())?;
         let beyond = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX];
         check_queries(&model, setup, &beyond.map(|x| [x, 0.5, x]))?;
         prop_assert!(stored(&model) == before, "a prediction changed the learner");
