@@ -54,19 +54,26 @@ impl Diary {
     }
 }
 
-/// A plant that rests wherever it is put; its state is lost at one look.
+/// A plant that rests wherever it is put; at one look its state is lost.
 struct Rest {
     diary: Diary,
     state: State,
     looks: u32,
-    lost_at_look: Option<u32>,
+    lost: Option<Lost>,
+}
+
+/// At which look a plant's state is lost, and the numbers that come instead.
+#[derive(Clone, Copy)]
+struct Lost {
+    at_look: u32,
+    to: [f64; 4],
 }
 
 impl Backend for Rest {
     fn sense(&mut self) -> Sensed {
         self.looks += 1;
-        if self.lost_at_look == Some(self.looks) {
-            self.state = State::new([f64::NAN; 4]);
+        if let Some(lost) = self.lost.filter(|lost| lost.at_look == self.looks) {
+            self.state = State::new(lost.to);
         }
         Sensed { state: self.state, age: Seconds(0.0) }
     }
@@ -98,10 +105,12 @@ impl Operator for Pusher {
     }
 }
 
-/// Notes what it is told, and keeps the policies.
+/// Notes what it is told, and keeps the policies and the last counts of samples.
 struct Notary {
     diary: Diary,
     policies: Vec<(u8, Model)>,
+    learned: u64,
+    refused: u64,
 }
 
 impl Witness for Notary {
@@ -115,7 +124,8 @@ impl Witness for Notary {
     fn happening(&mut self, happening: Happening) {
         self.diary.note(Entry::Told(happening.event));
     }
-    fn standing(&mut self, _standing: Standing) {
+    fn standing(&mut self, standing: Standing) {
+        (self.learned, self.refused) = (standing.learned, standing.refused);
         self.diary.note(Entry::Told("standing"));
     }
     fn policy(&mut self, percent: Option<u8>, learner: &Model) {
@@ -159,7 +169,7 @@ fn profile(phases: &str) -> Profile {
 }
 
 impl Session {
-    fn new(profile: &Profile, attended: bool, lost_at_look: Option<u32>) -> Self {
+    fn new(profile: &Profile, attended: bool, lost: Option<Lost>) -> Self {
         let (tick, seed) = (profile.tick(), 1);
         let diary = Diary::default();
         let plan = Plan::new(&profile.session, tick, seed, attended);
@@ -174,13 +184,13 @@ impl Session {
             teaching: profile.teaching.clone(),
             fresh: fresh.clone(),
         };
-        let plant = Rest { diary: diary.clone(), state: State::default(), looks: 0, lost_at_look };
+        let plant = Rest { diary: diary.clone(), state: State::default(), looks: 0, lost };
         let limits = Limits { action: LIMIT, stale: Seconds(1.0) };
         let crew = Crew {
             task: profile.experiment.task(tick),
             backend: Safe::new(Box::new(plant), limits),
             operator: Box::new(Pusher(PUSH)),
-            witness: Notary { diary: diary.clone(), policies: Vec::new() },
+            witness: Notary { diary: diary.clone(), policies: Vec::new(), learned: 0, refused: 0 },
             publisher: Some(publisher),
         };
         let cycle = Cycle::new(rules, crew, fresh, None);
@@ -232,10 +242,11 @@ fn policies(entries: &[Entry]) -> Vec<u8> {
 /// The look within the tick that ends the first rollout: each tick looks before it decides,
 /// while it actuates, and at what came of it.
 const LAST_LOOK: u32 = 3 * (TICKS - 1) + 2;
+const GONE: Lost = Lost { at_look: LAST_LOOK, to: [f64::NAN; 4] };
 
 #[test]
 fn a_trip_at_a_rollouts_end_holds_the_plant_until_a_person_begins_anew() {
-    let mut session = Session::new(&profile("introduction, main"), true, Some(LAST_LOOK));
+    let mut session = Session::new(&profile("introduction, main"), true, Some(GONE));
     session.ask(Command::Begin);
     session.tick(TICKS - 1);
     assert_eq!(applied(&session.diary.take()), [PUSH; TICKS as usize - 1]);
@@ -256,7 +267,7 @@ fn a_trip_at_a_rollouts_end_holds_the_plant_until_a_person_begins_anew() {
 
 #[test]
 fn a_trip_where_nobody_could_begin_anew_ends_the_session_with_its_cause() {
-    let session = Session::new(&profile("introduction, main"), false, Some(LAST_LOOK));
+    let session = Session::new(&profile("introduction, main"), false, Some(GONE));
     let diary = session.diary.clone();
     let outcome = session.finish();
     assert_eq!(outcome.finish, Finish::Aborted);
@@ -294,6 +305,17 @@ fn a_plant_stops_before_anything_is_written_about_it() {
     let before = [Entry::Applied(PUSH), Entry::Told("step")];
     assert_eq!(entries[..2], before, "{entries:?}");
     assert_eq!(after.len(), entries.len() - 2, "the rollout's end: {entries:?}");
+}
+
+/// From the second tick of the first rollout on the state is finite, but not in units of the
+/// learner's norm. Counts are told at the ends of eight whole rollouts.
+#[test]
+fn a_sample_that_the_learner_refuses_is_counted_and_not_learned() {
+    let far = Lost { at_look: 4, to: [f64::MAX, 0.0, 0.0, 0.0] };
+    let outcome = Session::new(&profile("main"), false, Some(far)).finish();
+    assert_eq!(outcome.finish, Finish::Complete);
+    let Notary { learned, refused, .. } = outcome.witness;
+    assert_eq!((learned, refused), (43, 5));
 }
 
 #[test]

@@ -2,13 +2,15 @@
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking, helpers too")]
 
+#[path = "learner/feed.rs"]
+mod feed;
 #[path = "learner/golden.rs"]
 mod golden;
 
 use coadapt::learner::lwpr::{Field, Growth, InitialMetric, Lwpr, Projection, Settings, UNKNOWN};
 use coadapt::learner::{Kernel, Kind, Learner, Model, Params};
-use golden::{agree, numbers, read, sample, stored, table, wild};
-use proptest::prelude::*;
+use feed::{sample, stored};
+use golden::{agree, numbers, read, table};
 use serde_json::Value;
 
 const CASES: [&str; 9] = [
@@ -424,51 +426,4 @@ fn an_input_that_stands_still_does_no_lasting_harm() {
     assert_eq!(lwpr.fields(), 1);
     let beta = lwpr.submodels()[0].fields()[0].regression.projections[0].beta();
     assert!((beta.abs() - 2.0).abs() < 1e-6, "{beta}");
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
-
-    #[test]
-    fn whatever_it_is_fed_it_stays_finite_and_within_its_limit(
-        samples in prop::collection::vec(([wild(300), wild(300)], wild(300), 0.0..10.0), 1..200),
-        queries in prop::collection::vec([wild(300), wild(300)], 20),
-        (diag_only, meta) in any::<(bool, bool)>(),
-        bi_square: bool,
-    ) {
-        let kernel = if bi_square { Kernel::BiSquare } else { Kernel::Gaussian };
-        let mut lwpr = profiled(&Params { diag_only, meta, kernel, ..params() }, 2);
-        for (x, y, weight) in &samples {
-            let update = lwpr.learn(x, &[*y], *weight).unwrap();
-            prop_assert!(update.output[0].abs() <= 10.0);
-            prop_assert!((0.0..=1.0).contains(&update.changes[0].max_activation));
-        }
-        // A learner that loads has only finite fields and positive metrics.
-        let before = stored(&lwpr);
-        prop_assert!(serde_json::from_str::<Lwpr>(&before).is_ok());
-        for x in samples.iter().map(|(x, ..)| x).chain(&queries) {
-            let (mut y, mut conf, mut max_w) = ([f64::NAN], [f64::NAN], [f64::NAN]);
-            lwpr.predict_with_confidence(x, &mut y, &mut conf, &mut max_w);
-            prop_assert!(y[0].abs() <= 10.0, "{} at {x:?}", y[0]);
-            prop_assert!((0.0..f64::INFINITY).contains(&conf[0]), "{} at {x:?}", conf[0]);
-            prop_assert!((0.0..=1.0).contains(&max_w[0]));
-            let mut plain = [f64::NAN];
-            prop_assert_eq!((lwpr.predict(x, &mut plain), plain), (max_w[0], y));
-        }
-        prop_assert_eq!(stored(&lwpr), before);
-    }
-
-    #[test]
-    fn without_our_limits_predictions_are_finite_too(
-        samples in prop::collection::vec(([wild(300)], wild(300), 0.0..10.0), 1..200),
-    ) {
-        let mut lwpr = Lwpr::new(Settings::new(1, 1)).unwrap();
-        for (x, y, weight) in &samples {
-            lwpr.learn(x, &[*y], *weight).unwrap();
-            let mut prediction = [f64::NAN];
-            lwpr.predict(x, &mut prediction);
-            prop_assert!(prediction[0].is_finite());
-        }
-        prop_assert!(serde_json::from_str::<Lwpr>(&stored(&lwpr)).is_ok());
-    }
 }

@@ -2,13 +2,15 @@
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking, helpers too")]
 
+#[path = "learner/feed.rs"]
+mod feed;
 #[path = "learner/golden.rs"]
 mod golden;
 
 use coadapt::learner::rfwr::{Growth, InitialMetric, Rfwr, Settings};
 use coadapt::learner::{Kernel, Learner, Model, Params};
-use golden::{agree, numbers, read, sample, stored, table, wild};
-use proptest::prelude::*;
+use feed::{sample, stored};
+use golden::{agree, numbers, read, table};
 use serde_json::Value;
 
 const CASES: [&str; 6] = [
@@ -319,49 +321,4 @@ fn a_sample_of_weight_0_teaches_nothing() {
     assert_eq!(rfwr.field_states(), before);
     rfwr.learn(&[0.1, 0.1], &[99.0], 0.5).unwrap();
     assert_ne!(rfwr.field_states(), before);
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
-
-    #[test]
-    fn whatever_it_is_fed_it_stays_finite_and_within_its_limit(
-        samples in prop::collection::vec(([wild(300), wild(300)], wild(300), 0.0..10.0), 1..200),
-        queries in prop::collection::vec([wild(300), wild(300)], 20),
-        (diag_only, meta) in any::<(bool, bool)>(),
-        bi_square: bool,
-    ) {
-        let kernel = if bi_square { Kernel::BiSquare } else { Kernel::Gaussian };
-        let params = Params { diag_only, meta, kernel, ..Params::default() };
-        let Model::Rfwr(mut rfwr) = profiled(&params, 2) else { panic!("another learner") };
-        for (x, y, weight) in &samples {
-            let update = rfwr.learn(x, &[*y], *weight).unwrap();
-            prop_assert!(update.output[0].abs() <= 10.0);
-            prop_assert!((0.0..=1.0).contains(&update.max_activation));
-        }
-        // A learner that loads has only finite fields and positive metrics.
-        let before = stored(&rfwr);
-        prop_assert!(serde_json::from_str::<Rfwr>(&before).is_ok());
-        for x in samples.iter().map(|(x, ..)| x).chain(&queries) {
-            let mut y = [f64::NAN];
-            let activation = rfwr.predict(x, &mut y);
-            prop_assert!(y[0].abs() <= 10.0, "{} at {x:?}", y[0]);
-            prop_assert!((0.0..=1.0).contains(&activation));
-        }
-        prop_assert_eq!(stored(&rfwr), before);
-    }
-
-    #[test]
-    fn without_our_limits_predictions_are_finite_too(
-        samples in prop::collection::vec(([wild(300)], wild(300), 0.0..10.0), 1..200),
-    ) {
-        let mut rfwr = Rfwr::new(Settings::new(1, 1)).unwrap();
-        for (x, y, weight) in &samples {
-            rfwr.learn(x, &[*y], *weight).unwrap();
-            let mut prediction = [f64::NAN];
-            rfwr.predict(x, &mut prediction);
-            prop_assert!(prediction[0].is_finite());
-        }
-        prop_assert!(serde_json::from_str::<Rfwr>(&stored(&rfwr)).is_ok());
-    }
 }

@@ -1,11 +1,10 @@
-//! Golden runs, read and compared; and samples for other tests of learners.
+//! Golden runs, read and compared.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::PathBuf;
 
 use flate2::read::GzDecoder;
-use proptest::prelude::*;
 use serde_json::Value;
 
 /// The text of a file of a case, such as `rfwr/a_1d`.
@@ -51,25 +50,4 @@ pub fn agree(what: &str, golden: &[Vec<f64>], ours: &[Vec<f64>], tolerance: f64)
             );
         }
     }
-}
-
-pub fn stored(model: &impl serde::Serialize) -> String {
-    serde_json::to_string(model).unwrap()
-}
-
-/// A smooth bent function of two inputs, sampled along a path that fills the square.
-pub fn sample(k: u32) -> ([f64; 2], [f64; 1]) {
-    let k = f64::from(k);
-    let (a, b) = ((k * 0.754_877_666).fract(), (k * 0.569_840_291).fract());
-    let x = [2.0 * a - 1.0, 2.0 * b - 1.0];
-    (x, [(3.0 * x[0]).sin() + x[1] * x[1] + 0.05 * (k * 12.9898).sin()])
-}
-
-/// Numbers of every size up to 10^±`decades`, and exactly 0.
-pub fn wild(decades: i32) -> impl Strategy<Value = f64> {
-    (-decades..=decades, -10.0..10.0, 0..8_u8).prop_map(|(power, digits, dice)| match dice {
-        0 => 0.0,
-        1..=4 => digits / 5.0,
-        _ => digits / 10.0 * 10_f64.powi(power),
-    })
 }
