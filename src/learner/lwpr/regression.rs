@@ -17,6 +17,8 @@ const LEAST_SQUARE: f64 = 1e-24;
 pub const RIPE: f64 = 0.1;
 /// The same for a projection before the next one is added.
 const RIPE_FOR_NEXT: f64 = 0.5;
+/// A projection with a smaller count has not seen any sample.
+const FRESH: f64 = 0.5;
 /// A projection has seen as much as the first one when its count is this share of it.
 const AS_MUCH: f64 = 0.99;
 
@@ -312,6 +314,10 @@ impl Rows<&mut [Row]> {
             let residual = (&mut found.residual[..old.size.inputs], settings);
             let per_s2 = self.projection(j).learn(simd, &before, heard, residual);
             found.per_s2[j].set(per_s2);
+            // At a projection's first sample, it accounts for the input of its axis.
+            let fresh = before.scalar(simd, N_DATA).simd_lt(FRESH);
+            let along = found.residual[j].get(simd);
+            found.residual[j].set(fresh.select(along - s, along));
             cost = fused(given.w * s * (given.w * s), per_s2, cost);
             target = yz - fitted;
             found.e_cvs[j].set(target);
