@@ -36,7 +36,8 @@ fn policy(learner: Model) -> Policy<Model> {
         mode: Mode::Simultaneous,
         percent: 100,
         features: ["x", "x_dot", "theta", "theta_dot"].map(str::to_owned).to_vec(),
-        action_limit: 10.0,
+        outputs: vec!["u_human".to_owned()],
+        action_limit: Some(10.0),
         learner,
     }
 }
