@@ -14,10 +14,16 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use coadapt::clock::{Clock, WallClock};
+use coadapt::clock::{Clock, VirtualClock, WallClock};
+use coadapt::control::snapshot::{Command as WatcherCommand, Watcher};
 use coadapt::learner::{Learner, Model, lwpr, rfwr};
+use coadapt::operator::terminal::{self, Hands};
+use coadapt::profile::Order;
 use coadapt::profile::settings::{LearnerFile, build};
 use coadapt::record::{Policy, read_policy};
+use coadapt::run::session::{Company, Keys, Session};
+use coadapt::session::Phase;
+use coadapt::session::machine::Stage;
 use coadapt::signal::Seconds;
 use desk::{Desk, names, text};
 use golden::{agree, read, table};
@@ -208,7 +214,7 @@ fn samples_that_are_not_finite_are_refused_counted_and_change_nothing() {
 }
 
 /// A session of the simulated person; the folder it left.
-fn session(desk: &Desk, mode: &str, learner: &str, more: &str) -> String {
+fn play(desk: &Desk, mode: &str, learner: &str, more: &str) -> String {
     desk.succeed(&format!(
         "run balance --headless --operator simulated:average --seed 5 --mode {mode} --learner \
          {learner} --phases introduction,main --set session.introduction_rollouts=2 {more}"
@@ -225,7 +231,7 @@ fn a_session_refitted_with_its_own_settings_gives_its_policy_to_the_byte() {
         ("sequential", "lwpr", "--duration 20"),
         ("simultaneous", "lwpr", "--rollouts 8 --set teaching.target=executed"),
     ] {
-        let folder = session(&desk, mode, learner, more);
+        let folder = play(&desk, mode, learner, more);
         let results = results(&desk.succeed(&format!("fit {folder} --out again.json --json")));
         assert_eq!(results["learner"], learner);
         let recorded = fs::read(desk.at(&folder).join("policy.json")).unwrap();
@@ -236,7 +242,7 @@ fn a_session_refitted_with_its_own_settings_gives_its_policy_to_the_byte() {
 #[test]
 fn a_session_is_refitted_with_other_settings_and_without_its_discarded_rollouts() {
     let desk = Desk::new();
-    let folder = session(&desk, "sequential", "rfwr", "--rollouts 6");
+    let folder = play(&desk, "sequential", "rfwr", "--rollouts 6");
     fs::write(desk.at("other.ron"), "(kind: lwpr, init_d: 1.0)").unwrap();
     let fit = format!("fit {folder} --json");
     let whole = results(&desk.succeed(&format!("{fit} --settings other.ron --out other.json")));
@@ -263,6 +269,67 @@ fn a_session_is_refitted_with_other_settings_and_without_its_discarded_rollouts(
     fs::write(&episodes, table.lines().take(6).collect::<Vec<_>>().join("\n") + "\n").unwrap();
     let cut = results(&desk.succeed(&fit));
     assert!(cut["samples"].as_u64() < whole["samples"].as_u64());
+}
+
+/// Virtual time, with a person at the keys who begins every phase, and discards the second
+/// rollout of main after its twentieth step.
+struct Person {
+    clock: VirtualClock,
+    watcher: Watcher,
+    discarded: bool,
+}
+
+impl Clock for Person {
+    fn now(&self) -> Seconds {
+        self.clock.now()
+    }
+
+    fn wait_until(&mut self, deadline: Seconds) {
+        self.clock.wait_until(deadline);
+        match self.watcher.look().stage {
+            Stage::Instruction(_) | Stage::Break { .. } => {
+                assert!(self.watcher.ask(WatcherCommand::Begin));
+            }
+            Stage::Running(moment)
+                if moment.phase == Phase::Main && moment.rollout == 2 && moment.step == 20 =>
+            {
+                let ask = !std::mem::replace(&mut self.discarded, true);
+                assert!(!ask || self.watcher.ask(WatcherCommand::Discard));
+            }
+            _ => {}
+        }
+    }
+
+    fn is_wall(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn a_discarded_rollout_is_in_no_refit() {
+    let desk = Desk::new();
+    let mut order = Order { logs: desk.at("logs"), seed: Some(3), ..Order::default() };
+    order.operator = "simulated:average".to_owned();
+    for (key, value) in [
+        ("session.phases", "[main]"),
+        ("session.main_rollouts", "5"),
+        ("session.break_s", "0.0"),
+        ("rules.fail_deg", "60.0"),
+    ] {
+        order.change(key, value);
+    }
+    let hands = Hands::new(&terminal::Params::default());
+    let keys = Keys { hands, clock: WallClock::start() };
+    let session = Session::begin(&order, Company::Attended(keys)).unwrap();
+    let folder = session.folder().to_owned();
+    let watcher = session.watcher.clone();
+    let mut person = Person { clock: VirtualClock::default(), watcher, discarded: false };
+    session.run(&mut person, || None).unwrap();
+    let episodes = fs::read_to_string(folder.join("episodes.csv")).unwrap();
+    assert_eq!(episodes.matches(",discarded,").count(), 1, "{episodes}");
+    desk.succeed("fit logs/anon/001-balance-simultaneous --out again.json");
+    let recorded = fs::read_to_string(folder.join("policy.json")).unwrap();
+    assert_eq!(fs::read_to_string(desk.at("again.json")).unwrap(), recorded);
 }
 
 /// The program refuses `line` with exit code 2, prints nothing, says all of `says`, and
@@ -353,6 +420,7 @@ fn wrong_settings_are_refused_all_at_once_with_their_place() {
     refused("s.json", "{\"init_alpha\": [50, 60]}", &["one rate serves all"]);
     refused("s.json", "{\"cutoff_predict\": 0.1, \"cutoff_update\": 0.01}", &["one cutoff"]);
     refused("s.json", "{\"algorithm\": \"mlp\"}", &["rfwr or lwpr"]);
+    refused("s.ron", "(kind: lwpr, learner: rfwr)", &["`kind` is lwpr", "another learner"]);
     refused("s.ron", "(init_d: NaN)", &["`init_d` is NaN"]);
     fs::write(desk.at("s.ron"), "(learner: lwpr)").unwrap();
     refuses(&desk, &format!("{BENT} --settings s.ron --learner rfwr"), &["these are settings for"]);
@@ -385,6 +453,9 @@ fn every_form_of_a_setting_is_taken() {
     let diagonal = settings(model("s.json", text));
     assert_eq!(diagonal.init_d, rfwr::InitialMetric::Diagonal(vec![9.0, 4.0]));
     assert_eq!((diagonal.init_alpha, diagonal.init_p, diagonal.meta), (7.0, 1e9, true));
+    let text = "(task: \"balance\", learner: (kind: rfwr, init_d: 2.0), sharing: (gate: 0.1))";
+    let section = settings(model("profile.ron", text));
+    assert_eq!(section.init_d, rfwr::InitialMetric::Scalar(2.0));
     let text = "(init_d: [[9.0, 1.0], [1.0, 4.0]], diag_only: false, d_floor: 0.5)";
     let full = settings(model("s.ron", text));
     let rows = vec![vec![9.0, 1.0], vec![1.0, 4.0]];

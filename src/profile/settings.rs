@@ -65,7 +65,8 @@ pub struct LearnerFile {
 }
 
 impl LearnerFile {
-    /// Reads the settings in `path`: JSON if that is its ending, RON otherwise.
+    /// Reads the settings in `path`: JSON if that is its ending, RON otherwise. Of a whole
+    /// profile it takes the learner's section.
     ///
     /// # Errors
     /// When it cannot be read, or with everything that is wrong with it.
@@ -219,15 +220,25 @@ impl LearnerFile {
                             whose entries are equal";
             faults.push(fault(setting, "is not supported", &self.source, expected.to_owned()));
         }
-        let cutoffs = ["cutoff", "cutoff_update", "cutoff_predict"];
-        let mut given = cutoffs.into_iter().filter_map(|name| self.setting(name));
-        if let Some(first) = given.next() {
-            for other in given.filter(|other| other.value != first.value) {
-                let expected = "one cutoff serves learning and predicting: give one".to_owned();
-                faults.push(fault(other, "differs from another cutoff", &self.source, expected));
-            }
-        }
+        faults.extend(self.disagreeing(
+            &["cutoff", "cutoff_update", "cutoff_predict"],
+            "one cutoff serves learning and predicting: give one",
+        ));
+        faults.extend(self.disagreeing(
+            &["learner", "kind", "algorithm"],
+            "another key names another learner: give one",
+        ));
         faults
+    }
+
+    /// The settings among `names`, which mean the same, that differ from the first given.
+    fn disagreeing(&self, names: &[&str], expected: &str) -> Vec<Fault> {
+        let mut given = names.iter().filter_map(|name| self.setting(name));
+        let Some(first) = given.next() else { return Vec::new() };
+        given
+            .filter(|other| other.value != first.value)
+            .map(|other| fault(other, "contradicts another key", &self.source, expected.to_owned()))
+            .collect()
     }
 
     fn cutoff(&self) -> Option<f64> {

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use csv::ByteRecord;
 
 /// The most faults of a table that are told.
-const MOST_FAULTS: usize = 20;
+pub(super) const MOST_FAULTS: usize = 20;
 /// No line of a table is longer than this, bytes.
 const LONGEST_LINE: usize = 1 << 20;
 

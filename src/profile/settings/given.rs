@@ -67,9 +67,20 @@ fn ron_entries(source: &str) -> Result<Vec<Entry>, Box<Fault>> {
         let why = broken.why.replace("the profile", "the file").replace("profile", "settings file");
         unreadable(source, broken.at, why)
     })?;
+    // Of a whole profile only the learner's section counts.
+    let is_profile = outline.iter().any(|entry| entry.path == "learner" && entry.is_section);
     let mut entries = Vec::new();
     let mut end = 0;
-    for entry in outline {
+    for mut entry in outline {
+        if is_profile {
+            match entry.path.strip_prefix("learner.") {
+                Some(key) => {
+                    let key = key.to_owned();
+                    entry.path = key;
+                }
+                None => continue,
+            }
+        }
         // What lies within a section belongs to its value.
         if entry.key.start < end {
             continue;

@@ -70,6 +70,12 @@ pub fn read(
         }
     }
     attempts.close();
+    if samples.is_empty() {
+        return Err(FitError::Unfit(format!(
+            "{} holds no samples: nobody steered in a whole rollout of its main phase",
+            folder.display()
+        )));
+    }
     let mut notices = Vec::new();
     if attempts.lost > 0 {
         notices.push(format!(
