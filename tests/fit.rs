@@ -87,6 +87,15 @@ fn follows(case: &str, tolerance: f64, head: &str) {
         let value = results[key].as_f64().unwrap();
         assert!(value > 0.0, "{case}: {key} {value}");
     }
+    let each: Vec<f64> = results["outputs"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|output| output["nmse_final"].as_f64().unwrap())
+        .collect();
+    assert_eq!(each.len(), outputs);
+    let mean = each.iter().sum::<f64>() / if outputs == 2 { 2.0 } else { 1.0 };
+    assert_eq!(results["nmse_final"], mean);
 }
 
 #[test]
@@ -254,6 +263,7 @@ fn a_session_is_refitted_with_other_settings_and_without_its_discarded_rollouts(
     let seen = results(&desk.succeed(&format!("{fit} --inputs theta,theta_dot --outputs u")));
     assert_eq!(seen["inputs"], serde_json::json!(["theta", "theta_dot"]));
     desk.succeed("evaluate other.json --starts 3");
+    refuses(&desk, &format!("{fit} --out {folder}/policy.json"), &["stays as it is"]);
 
     // The third rollout of main, as if its person had thrown it away and repeated it.
     let episodes = desk.at(&folder).join("episodes.csv");

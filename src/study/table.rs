@@ -92,9 +92,7 @@ impl<R: Read> Table<R> {
         }
         if self.has_blanks {
             self.faults.push(
-                "remove lines with empty cells, or write NaN where a value is missing: such a line \
-                 is refused and counted"
-                    .to_owned(),
+                "remove lines with empty cells, or write NaN where a value is missing".to_owned(),
             );
         }
         Err(TableError::Faults(std::mem::take(&mut self.faults)))

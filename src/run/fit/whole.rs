@@ -47,6 +47,14 @@ impl Whole {
         if read.iter().any(|other| fs::canonicalize(other).is_ok_and(|other| other == place)) {
             return Err(refuse("this file is read by this very command; name another".to_owned()));
         }
+        let is_within = |folder: &&Path| {
+            folder.is_dir()
+                && fs::canonicalize(folder).is_ok_and(|folder| place.starts_with(folder))
+        };
+        if place.exists() && read.iter().any(is_within) {
+            let why = "this file is a part of the session, which stays as it is; name another";
+            return Err(refuse(why.to_owned()));
+        }
         let folder = match place.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
