@@ -457,7 +457,7 @@ fn every_form_of_a_setting_is_taken() {
     };
     let scalar = settings(model("s.ron", "(init_d: 9, norm_in: [2, 3], INIT_ALPHA: 7.0)"));
     assert_eq!(scalar.init_d, rfwr::InitialMetric::Scalar(9.0));
-    assert_eq!((scalar.norm_in, scalar.init_alpha), (vec![2.0, 3.0], 7.0));
+    assert_eq!((&scalar.norm_in[..], scalar.init_alpha), (&[2.0, 3.0][..], 7.0));
     let text = "\u{feff}{\"init_D\": [[9, 0], [0, 4]], \"init_alpha\": [[7, 7], [7, 7]],
         \"max_fields\": null, \"kernel\": \"BiSquare\", \"init_P\": [1e9, 1e9], \"meta\": 1}";
     let diagonal = settings(model("s.json", text));
@@ -469,7 +469,12 @@ fn every_form_of_a_setting_is_taken() {
     let text = "(init_d: [[9.0, 1.0], [1.0, 4.0]], diag_only: false, d_floor: 0.5)";
     let full = settings(model("s.ron", text));
     let rows = vec![vec![9.0, 1.0], vec![1.0, 4.0]];
-    assert_eq!((full.init_d, full.d_floor), (rfwr::InitialMetric::Full(rows), Some(0.5)));
+    assert_eq!((&full.init_d, full.d_floor), (&rfwr::InitialMetric::Full(rows), Some(0.5)));
+    // The settings of a policy, as they stand there.
+    let settings_of = |settings: &rfwr::Settings| serde_json::to_string(settings).unwrap();
+    for before in [&full, &diagonal, &scalar] {
+        assert_eq!(&settings(model("s.json", &settings_of(before))), before);
+    }
 }
 
 #[test]

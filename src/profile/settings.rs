@@ -202,9 +202,12 @@ impl LearnerFile {
     /// What does not fit the data, or another setting.
     fn faults(&self, diag_only: bool, (inputs, outputs): (usize, usize)) -> Vec<Fault> {
         let mut faults = Vec::new();
-        for (name, option, columns) in
-            [("n_in", "--inputs", inputs), ("n_out", "--outputs", outputs)]
-        {
+        for (name, option, columns) in [
+            ("n_in", "--inputs", inputs),
+            ("inputs", "--inputs", inputs),
+            ("n_out", "--outputs", outputs),
+            ("outputs", "--outputs", outputs),
+        ] {
             #[expect(clippy::cast_precision_loss, reason = "a number of columns")]
             if let Some(setting) = self.setting(name)
                 && self.number(name) != Some(columns as f64)

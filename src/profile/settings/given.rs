@@ -44,11 +44,34 @@ pub(super) enum Given {
     List(Vec<f64>),
     /// Rows of numbers.
     Matrix(Vec<Vec<f64>>),
+    /// As a policy's settings have it.
+    Tagged(Tagged),
     /// `None` or `null`.
     Nothing,
     /// What no setting can be.
     #[serde(skip)]
     Other,
+}
+
+/// A metric as a policy's settings have it.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Tagged {
+    Scalar(f64),
+    Diagonal(Vec<f64>),
+    Full(Vec<Vec<f64>>),
+}
+
+impl Given {
+    /// The same without a tag.
+    fn plain(self) -> Self {
+        match self {
+            Self::Tagged(Tagged::Scalar(number)) => Self::Number(number),
+            Self::Tagged(Tagged::Diagonal(list)) => Self::List(list),
+            Self::Tagged(Tagged::Full(rows)) => Self::Matrix(rows),
+            other => other,
+        }
+    }
 }
 
 /// The entries of `source`.
@@ -118,7 +141,7 @@ fn json_entries(source: &str) -> Result<Vec<Entry>, Box<Fault>> {
         let text = raw.get();
         // The text is a part of the source: how far it is from its start is its place.
         let start = (text.as_ptr() as usize).saturating_sub(source.as_ptr() as usize);
-        let value = serde_json::from_str(text).unwrap_or(Given::Other);
+        let value = serde_json::from_str(text).unwrap_or(Given::Other).plain();
         Entry { key, at: start..start + text.len(), value }
     };
     Ok(entries.into_iter().map(entry).collect())

@@ -51,7 +51,7 @@ const SMALL: f64 = 1e-12;
 const BIG: f64 = 1e12;
 
 /// All keys, in small letters.
-pub(super) const KEYS: [Key; 38] = [
+pub(super) const KEYS: [Key; 40] = [
     key("learner", Form::Learner),
     key("kind", Form::Learner),
     key("algorithm", Form::Learner),
@@ -86,6 +86,8 @@ pub(super) const KEYS: [Key; 38] = [
     key("min_one_minus_h", Form::Limit(SMALL, 1.0)),
     key("n_in", Form::Columns),
     key("n_out", Form::Columns),
+    key("inputs", Form::Columns),
+    key("outputs", Form::Columns),
     key("case", Form::Remark),
     key("description", Form::Remark),
     key("n_train", Form::Remark),
