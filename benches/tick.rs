@@ -109,6 +109,7 @@ fn scribe(profile: &Profile, logs: &Path) -> Scribe {
         preset: sidecar.preset,
         mode: sidecar.mode,
         features: columns.iter().map(|&name| name.to_owned()).collect(),
+        output: "u_human".to_owned(),
         action_limit: 10.0,
     };
     Scribe::new(recorder, origin, plan(profile), Vec::new(), String::new)

@@ -13,6 +13,7 @@ Examples:
   coadapt run balance --subject S07             one session, you at the keyboard
   coadapt run balance --headless --operator simulated:average --seed 1 --json
   coadapt run --headless --resume logs/S07/001-balance-simultaneous
+  coadapt fit data.csv --inputs a,b --outputs u a learner on a table, offline
   coadapt profile show balance                  every key, its value and its origin
 
 Results go to standard output, messages to standard error.
@@ -36,6 +37,8 @@ pub enum Command {
     Run(Box<Run>),
     /// Let a recorded policy act alone over many starts.
     Evaluate(Evaluate),
+    /// A learner on a table or a recorded session, offline.
+    Fit(Fit),
     /// A plant open loop: a table of actions in, a table of states out.
     Simulate(Simulate),
     /// Look at profiles.
@@ -115,6 +118,54 @@ pub struct Evaluate {
     /// The seed of the plant's noise.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Print one JSON object instead of sentences.
+    #[arg(long)]
+    pub json: bool,
+}
+
+const FIT_EXAMPLES: &str = "\
+Examples:
+  coadapt fit data.csv --inputs x1,x2 --outputs y --settings lwpr.ron --json
+  coadapt fit data.csv --inputs x1,x2 --outputs y --query grid.csv --predictions out.csv
+  coadapt fit logs/S07/001-balance-sequential --learner lwpr --out policy.json
+  zcat data.csv.gz | coadapt fit - --inputs x1,x2 --outputs y
+
+The settings are RON, or JSON in a file that ends in .json; profiles/learners/ has commented
+examples of every key. What they leave out is the session's, or else the published value.
+NaN and infinite samples are refused and counted.
+
+nmse one step: each sample predicted just before it is learned; nmse final: the final learner on
+the same samples; both are mean squared errors over the output's variance, and of several
+outputs the mean. samples/s is that of the learning pass, reading and predicting included.";
+
+/// The words of `fit`.
+#[derive(Args, Debug)]
+#[command(after_help = FIT_EXAMPLES)]
+pub struct Fit {
+    /// A CSV table whose first line names its columns, `-` for standard input, or the folder
+    /// of a recorded session.
+    pub data: PathBuf,
+    /// rfwr or lwpr [default: the settings', the session's, or rfwr].
+    #[arg(long, value_name = "LEARNER")]
+    pub learner: Option<String>,
+    /// The learner's settings, RON or JSON by the file's ending.
+    #[arg(long, value_name = "FILE")]
+    pub settings: Option<PathBuf>,
+    /// The columns to learn from [default: a session's features].
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
+    pub inputs: Option<Vec<String>>,
+    /// The columns to be learned [default: a session's `u_human`].
+    #[arg(long, value_name = "U", value_delimiter = ',')]
+    pub outputs: Option<Vec<String>>,
+    /// A table with the inputs' columns, to be answered by the final learner.
+    #[arg(long, value_name = "FILE", requires = "predictions")]
+    pub query: Option<PathBuf>,
+    /// Where the answers go, as a CSV table.
+    #[arg(long, value_name = "FILE", requires = "query")]
+    pub predictions: Option<PathBuf>,
+    /// Where the final learner goes, as a policy.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
     /// Print one JSON object instead of sentences.
     #[arg(long)]
     pub json: bool,

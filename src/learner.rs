@@ -2,7 +2,10 @@
 //!
 //! [`Params`] is a profile's section, from which [`Params::build`] makes a [`Model`].
 
-#![expect(clippy::inline_always, reason = "loops of a constant length are unrolled: see `Size`")]
+#![expect(
+    clippy::inline_always,
+    reason = "only what is inlined is compiled for the vector unit: see `lanes::Work`"
+)]
 
 mod columns;
 mod growth;

@@ -13,6 +13,7 @@ mod order;
 mod reading;
 mod report;
 mod scan;
+pub mod settings;
 mod show;
 
 use serde::{Deserialize, Serialize};

@@ -15,6 +15,7 @@ mod error;
 pub mod evaluation;
 mod finite;
 pub mod folder;
+mod layout;
 mod names;
 pub mod policy;
 pub mod reader;
@@ -26,7 +27,7 @@ pub use checkpoint::{Checkpoint, Resumed};
 pub use error::Error;
 pub use evaluation::EvaluationRow;
 pub use folder::Folder;
-pub use policy::{Policy, read_policy};
+pub use policy::{Policy, policy_text, read_policy};
 pub use sidecar::{Sidecar, Status, read_sidecar};
 pub use writer::{Manner, Recorder};
 

@@ -1,6 +1,7 @@
 //! The composition root: the one room that knows every other.
 
 mod choose;
+mod fit;
 pub mod outcome;
 mod screen;
 pub mod session;
@@ -61,6 +62,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Run(run)) if run.headless => headless(run),
         Some(Command::Run(run)) => screen::screen(Some(run)),
         Some(Command::Evaluate(evaluate)) => words::evaluate(evaluate),
+        Some(Command::Fit(words)) => fit::fit(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::Profile(profile)) => words::profile(profile),
     }

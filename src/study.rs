@@ -1,4 +1,7 @@
-//! Runs without a screen: evaluation of policies and open-loop simulation.
+//! Runs without a screen: evaluation of policies, fits of tables, open-loop
+//! simulation.
 
 pub mod evaluate;
+pub mod fit;
 pub mod simulate;
+pub mod table;

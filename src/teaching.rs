@@ -16,6 +16,17 @@ pub enum Target {
     Executed,
 }
 
+impl Target {
+    /// The column of a session's rows that holds it.
+    #[must_use]
+    pub const fn column(self) -> &'static str {
+        match self {
+            Self::Human => "u_human",
+            Self::Executed => "u_applied",
+        }
+    }
+}
+
 /// The parameters of teaching.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

@@ -100,8 +100,8 @@ fn a_gigabyte_is_refused_and_not_read() {
     refuses(&desk, &format!("run balance {run} script:big.csv"), &["big.csv", "1073741824"]);
     refuses(&desk, &format!("run big.ron {run} none"), &["big.ron", "larger than"]);
     let simulate = "simulate balance --start 0,0,0,0 --actions";
-    refuses(&desk, &format!("{simulate} big.csv"), &["big.csv", "at most"]);
-    refuses(&desk, &format!("{simulate} /dev/zero"), &["/dev/zero", "at most"]);
+    refuses(&desk, &format!("{simulate} big.csv"), &["big.csv", "1 MiB"]);
+    refuses(&desk, &format!("{simulate} /dev/zero"), &["/dev/zero", "1 MiB"]);
     refuses(&desk, "evaluate big.csv", &["big.csv"]);
 }
 
@@ -176,7 +176,7 @@ fn wrong_tables_of_actions_name_their_line() {
     let from =
         |start: &str, table: &str| format!("simulate balance --start {start} --actions {table}");
     refuses(&desk, &from("0,0,0,0", "nan.csv"), &["nan.csv", "line 3"]);
-    refuses(&desk, &from("0,0,0,0", "columns.csv"), &["columns.csv", "`u`"]);
+    refuses(&desk, &from("0,0,0,0", "columns.csv"), &["columns.csv", "no column u, only force"]);
     refuses(&desk, &from("0,0,0,0", "missing.csv"), &["missing.csv", "No such file"]);
     refuses(&desk, &from("0,0", "nan.csv"), &["2 numbers", "x,x_dot,theta,theta_dot"]);
     refuses(&desk, &from("0,0,NaN,0", "nan.csv"), &["not finite"]);

@@ -1,6 +1,6 @@
 //! The control cycle with a plant, an operator and a witness made for the test.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking, helpers too")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking, helpers too")]
 
 use std::sync::{Arc, Mutex};
 
@@ -10,7 +10,7 @@ use coadapt::clock::{Pacer, VirtualClock};
 use coadapt::control::cycle::{Crew, Cycle, Outcome, Rules};
 use coadapt::control::snapshot::{Command, Watcher, channel};
 use coadapt::control::witness::{Happening, Standing, Witness};
-use coadapt::learner::Model;
+use coadapt::learner::{Learner, Model};
 use coadapt::operator::{Operator, View};
 use coadapt::profile::{Document, Profile};
 use coadapt::random::Place;
@@ -58,6 +58,8 @@ impl Diary {
 struct Rest {
     diary: Diary,
     state: State,
+    /// The speed that it claims, m/s.
+    speed: f64,
     looks: u32,
     lost: Option<Lost>,
 }
@@ -88,7 +90,8 @@ impl Backend for Rest {
     }
 
     fn prepare(&mut self, start: State, _place: Place) {
-        self.state = start;
+        let [x, _, theta, theta_dot] = start[..] else { panic!("{start:?}") };
+        self.state = State::new([x, self.speed, theta, theta_dot]);
     }
 }
 
@@ -170,6 +173,10 @@ fn profile(phases: &str) -> Profile {
 
 impl Session {
     fn new(profile: &Profile, attended: bool, lost: Option<Lost>) -> Self {
+        Self::at_speed(0.0, profile, attended, lost)
+    }
+
+    fn at_speed(speed: f64, profile: &Profile, attended: bool, lost: Option<Lost>) -> Self {
         let (tick, seed) = (profile.tick(), 1);
         let diary = Diary::default();
         let plan = Plan::new(&profile.session, tick, seed, attended);
@@ -184,7 +191,8 @@ impl Session {
             teaching: profile.teaching.clone(),
             fresh: fresh.clone(),
         };
-        let plant = Rest { diary: diary.clone(), state: State::default(), looks: 0, lost };
+        let (state, looks) = (State::default(), 0);
+        let plant = Rest { diary: diary.clone(), state, speed, looks, lost };
         let limits = Limits { action: LIMIT, stale: Seconds(1.0) };
         let crew = Crew {
             task: profile.experiment.task(tick),
@@ -237,6 +245,21 @@ fn policies(entries: &[Entry]) -> Vec<u8> {
             _ => None,
         })
         .collect()
+}
+
+#[test]
+fn samples_that_the_learner_refuses_are_told_once_a_rollout() {
+    // Divided by its norm, 1 m/s, this speed is a number; divided by a smaller one it is not.
+    let mut profile = profile("introduction, main");
+    profile.learner.norm_in = vec![1e-6; 4];
+    let session = Session::at_speed(1e305, &profile, false, None);
+    let diary = session.diary.clone();
+    let outcome = session.finish();
+    assert_eq!((outcome.learned, outcome.refused), (0, 50));
+    assert_eq!(outcome.learner.fields(), 0, "the learner is untouched");
+    let told = diary.take().iter().filter(|e| **e == Entry::Told("samples_refused")).count();
+    // Main's fifty ticks; nothing is learned, or refused, in the introduction.
+    assert_eq!(told, 50_usize.div_ceil(TICKS as usize));
 }
 
 /// The look within the tick that ends the first rollout: each tick looks before it decides,

@@ -203,10 +203,11 @@ fn files_are_short_and_none_is_called_mod() {
 }
 
 /// Words that only some places may use.
-const RESERVED: [(&str, &[&str]); 6] = [
+const RESERVED: [(&str, &[&str]); 7] = [
     ("ratatui::", &["tui"]),
     ("crossterm::", &["tui", "operator/terminal"]),
     ("gilrs::", &["operator/gamepad"]),
+    ("indicatif::", &["run/fit/progress"]),
     ("serialport::", &["backend/serial", "backend/emulator"]),
     ("Instant::now", &["clock"]),
     ("SystemTime::now", &["clock"]),

@@ -268,7 +268,7 @@ proptest! {
         for sample in &samples {
             rfwr.learn(&sample.x[..2], &sample.y[..1], sample.weight).unwrap();
         }
-        let field = rfwr.field_states().iter().next().unwrap().regression.clone();
+        let field = rfwr.field_states().first().unwrap().regression.clone();
         let batch = batch(&samples, (d, 1e6), (init_lambda, tau_lambda, 0.999));
         prop_assert_eq!(rfwr.fields(), 1);
         let error = (batch - Vector2::from_row_slice(&field.slopes)).norm();

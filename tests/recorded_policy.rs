@@ -4,7 +4,7 @@
 
 use std::fs;
 
-use coadapt::learner::{Kernel, Learner, Model, Params};
+use coadapt::learner::{Kernel, Kind, Learner, Model, Params};
 use coadapt::record::policy::{Policy, file_name, read_policy, write_policy};
 use coadapt::sharing::Mode;
 
@@ -36,7 +36,8 @@ fn policy(learner: Model) -> Policy<Model> {
         mode: Mode::Simultaneous,
         percent: 100,
         features: ["x", "x_dot", "theta", "theta_dot"].map(str::to_owned).to_vec(),
-        action_limit: 10.0,
+        outputs: vec!["u_human".to_owned()],
+        action_limit: Some(10.0),
         learner,
     }
 }
@@ -59,6 +60,8 @@ fn a_policy_read_back_is_the_same_to_the_last_bit_and_learns_on_the_same() {
         Params::default(),
         Params { diag_only: false, meta: true, ..Params::default() },
         Params { kernel: Kernel::BiSquare, update_d: false, ..Params::default() },
+        Params { kind: Kind::Lwpr, ..Params::default() },
+        Params { kind: Kind::Lwpr, diag_only: false, meta: true, ..Params::default() },
     ];
     for params in kinds {
         let written = policy(taught(&params));

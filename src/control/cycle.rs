@@ -10,7 +10,7 @@ use super::witness::{Happening, Standing, Witness};
 use crate::backend::safety::Safe;
 use crate::backend::{Backend, Sensed};
 use crate::clock::{Clock, Pacer, Wake};
-use crate::learner::{Learner, Model};
+use crate::learner::{Learner, Model, Refusal};
 use crate::operator::{Feedback, Operator, View};
 use crate::record::{EpisodeRow, StepRow};
 use crate::session::machine::{self, Event, Finish, Stage};
@@ -96,6 +96,8 @@ pub(super) struct Mind {
 pub(super) struct Rollout {
     pub(super) start: f64,
     pub(super) total_reward: f64,
+    /// Samples that the learner refused, and why.
+    pub(super) refused: Option<(u64, Refusal)>,
 }
 
 /// A session under way.
@@ -336,7 +338,11 @@ impl<W: Witness> Cycle<W> {
         if let Some(lesson) = lesson {
             match self.mind.learner.update(&lesson.x, &[lesson.y], lesson.weight) {
                 Ok(()) => self.mind.learned += 1,
-                Err(_) => self.mind.refused += 1,
+                Err(why) => {
+                    self.mind.refused += 1;
+                    let so_far = self.rollout.refused.map_or(0, |(count, _)| count);
+                    self.rollout.refused = Some((so_far + 1, why));
+                }
             }
         }
     }

@@ -116,6 +116,10 @@ impl<W: Witness> Cycle<W> {
             state,
         ));
         self.mark_losses(moment);
+        if let Some((count, why)) = self.rollout.refused {
+            let cause = format!("{count} of this rollout's samples were not learned: {why}");
+            self.note("samples_refused", Some(moment), None, cause);
+        }
         let row = self.episode_row(moment, end);
         self.crew.witness.episode(&row);
         if let Some(publisher) = &self.crew.publisher {

@@ -19,8 +19,10 @@ pub struct Origin {
     pub preset: String,
     /// What the robot does while it learns.
     pub mode: Mode,
-    /// The names of the learner's inputs.
+    /// The names of the learner's inputs,
     pub features: Vec<String>,
+    /// and of its output.
+    pub output: String,
     /// The largest action.
     pub action_limit: f64,
 }
@@ -124,7 +126,7 @@ impl Witness for Scribe {
             self.tenths.retain(|(stored, _)| *stored != percent);
             self.tenths.push((percent, learner.clone()));
         }
-        let Origin { task, preset, mode, features, action_limit } = self.origin.clone();
+        let Origin { task, preset, mode, features, output, action_limit } = self.origin.clone();
         let policy = Policy {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             task,
@@ -132,7 +134,8 @@ impl Witness for Scribe {
             mode,
             percent: percent.unwrap_or(100),
             features,
-            action_limit,
+            outputs: vec![output],
+            action_limit: Some(action_limit),
             learner: learner.clone(),
         };
         self.recorder.policy(percent, Box::new(policy));

@@ -167,8 +167,7 @@ pub fn exp<S: Simd>(x: Lanes<S>) -> Lanes<S> {
     let r2 = r * r;
     let r4 = r2 * r2;
     let first = fused(r2, line(r, 1.0 / 6.0, 0.5), line(r, 1.0, 1.0));
-    let second =
-        fused(r2, line(r, 1.0 / 5040.0, 1.0 / 720.0), line(r, 1.0 / 120.0, 1.0 / 24.0));
+    let second = fused(r2, line(r, 1.0 / 5040.0, 1.0 / 720.0), line(r, 1.0 / 120.0, 1.0 / 24.0));
     let third = fused(
         r2,
         line(r, 1.0 / 39_916_800.0, 1.0 / 3_628_800.0),
@@ -250,7 +249,8 @@ mod tests {
 
     #[test]
     fn exp_at_its_ends() {
-        let [zero, low, high, nan, ..] = run(Level::new(), Exp([0.0, -1e9, 1e9, f64::NAN, 1.0, 1.0, 1.0, 1.0]));
+        let [zero, low, high, nan, ..] =
+            run(Level::new(), Exp([0.0, -1e9, 1e9, f64::NAN, 1.0, 1.0, 1.0, 1.0]));
         assert_eq!(zero, 1.0);
         assert!((low, high) == ((-700.0_f64).exp(), 700.0_f64.exp()), "{low} {high}");
         assert!(nan.is_nan());

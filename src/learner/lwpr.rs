@@ -74,7 +74,7 @@ pub struct Lwpr {
     settings: Settings,
     samples: u64,
     submodels: Vec<Submodel>,
-    workshop: Workshop,
+    workshop: Box<Workshop>,
 }
 
 /// A learner as in a file.
@@ -113,7 +113,7 @@ impl Lwpr {
     /// # Errors
     /// When a setting is outside its range or a length does not fit.
     pub fn new(settings: Settings) -> Result<Self, BuildError> {
-        let workshop = Workshop::new(&settings)?;
+        let workshop = Box::new(Workshop::new(&settings)?);
         let fresh = |_| Submodel::new(&settings, &workshop);
         let submodels = (0..settings.outputs).map(fresh).collect();
         Ok(Self { settings, samples: 0, submodels, workshop })
@@ -232,7 +232,7 @@ impl TryFrom<Stored> for Lwpr {
 
     fn try_from(stored: Stored) -> Result<Self, BuildError> {
         let Stored { settings, samples, submodels } = stored;
-        let workshop = Workshop::new(&settings)?;
+        let workshop = Box::new(Workshop::new(&settings)?);
         let (given, wanted) = (submodels.len(), settings.outputs);
         if given != wanted {
             return Err(BuildError::Length { key: "submodels", given, wanted });

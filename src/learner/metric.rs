@@ -1,6 +1,6 @@
 //! The distance metric D of a receptive field, and how it is learned.
 //!
-//! D = MᵀM with an upper triangular M stays positive whatever M is. M descends the gradient
+//! `D = MᵀM` with an upper triangular M stays positive whatever M is. M descends the gradient
 //! of the field's cost J = J₁ + J₂ with one learning rate per entry; with meta learning the
 //! rates themselves follow their own gradient (incremental delta-bar-delta).
 //!

@@ -245,15 +245,22 @@ mod tests {
         let nan = f64::NAN;
         let far = [nan; 4];
         for (q, two) in [
-            (vec![[5.0, nan, 3.0, 9.0], far, [3.0, 7.0, nan, nan], far], [Some((2, 3.0)), Some((8, 3.0))]),
+            (
+                vec![[5.0, nan, 3.0, 9.0], far, [3.0, 7.0, nan, nan], far],
+                [Some((2, 3.0)), Some((8, 3.0))],
+            ),
             (vec![[9.0; 4], [9.0, 8.0, 9.0, 9.0]], [Some((5, 8.0)), Some((0, 9.0))]),
-            (vec![[2.0, 9.0, 9.0, 9.0], far, [1.0, 9.0, 9.0, 9.0], far], [Some((8, 1.0)), Some((0, 2.0))]),
+            (
+                vec![[2.0, 9.0, 9.0, 9.0], far, [1.0, 9.0, 9.0, 9.0], far],
+                [Some((8, 1.0)), Some((0, 2.0))],
+            ),
             (vec![[nan, 4.0, nan, nan], far], [Some((1, 4.0)), None]),
             (vec![], [None, None]),
         ] {
-            let q: Vec<[f64; LANES]> = q.chunks(2).map(|half| {
-                std::array::from_fn(|lane| half[lane / 4][lane % 4])
-            }).collect();
+            let q: Vec<[f64; LANES]> = q
+                .chunks(2)
+                .map(|half| std::array::from_fn(|lane| half[lane / 4][lane % 4]))
+                .collect();
             assert_eq!(run(Level::new(), Note(q.clone())), two, "{q:?}");
         }
     }
@@ -295,7 +302,9 @@ mod tests {
             ),
         ] {
             let mut shapes = Shapes::new(1, true);
-            centres.iter().for_each(|&centre| shapes.push(&[centre], &[1.0]));
+            for &centre in &centres {
+                shapes.push(&[centre], &[1.0]);
+            }
             for (gathers, expected) in [(true, gathered), (false, blocks)] {
                 let groups = run(Level::new(), Find(&shapes, gathers));
                 let fields = |group: &Vec<(usize, f64)>| group.iter().map(|near| near.0).collect();

@@ -23,6 +23,23 @@ pub enum Kind {
     Lwpr,
 }
 
+impl Kind {
+    /// The word outside: on the command line and in files.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Rfwr => "rfwr",
+            Self::Lwpr => "lwpr",
+        }
+    }
+
+    /// The learner of that word, if there is one.
+    #[must_use]
+    pub fn from_word(word: &str) -> Option<Self> {
+        [Self::Rfwr, Self::Lwpr].into_iter().find(|kind| kind.word() == word)
+    }
+}
+
 /// What a profile says about the learner. Lengths are in units of the norms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -120,7 +137,9 @@ impl Params {
         }
     }
 
-    fn rfwr(&self, inputs: usize, output_limit: f64) -> rfwr::Settings {
+    /// The same as settings of RFWR, whatever the kind.
+    #[must_use]
+    pub fn rfwr(&self, inputs: usize, output_limit: f64) -> rfwr::Settings {
         rfwr::Settings {
             kernel: self.kernel,
             diag_only: self.diag_only,
@@ -147,7 +166,9 @@ impl Params {
         }
     }
 
-    fn lwpr(&self, inputs: usize, output_limit: f64) -> lwpr::Settings {
+    /// The same as settings of LWPR, whatever the kind.
+    #[must_use]
+    pub fn lwpr(&self, inputs: usize, output_limit: f64) -> lwpr::Settings {
         lwpr::Settings {
             kernel: self.kernel,
             diag_only: self.diag_only,

@@ -3,8 +3,8 @@
 
 use std::ops::Range;
 
-use fearless_simd::prelude::*;
 use fearless_simd::f64x4;
+use fearless_simd::prelude::*;
 
 use super::lanes::{Eight, LANES, Mask, Row};
 
@@ -40,8 +40,7 @@ pub struct Records {
 }
 
 fn pack(numbers: &[f64]) -> Vec<Chunk> {
-    let chunk =
-        |part: &[f64]| Chunk(std::array::from_fn(|k| part.get(k).copied().unwrap_or(0.0)));
+    let chunk = |part: &[f64]| Chunk(std::array::from_fn(|k| part.get(k).copied().unwrap_or(0.0)));
     numbers.chunks(CHUNK).map(chunk).collect()
 }
 
@@ -268,10 +267,10 @@ mod tests {
         let eight = [4, 0, 2, 1, 8, 7, 6, 5];
         let wanted = [1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
         let rows = run(Level::new(), Negate(&mut records, eight, wanted));
-        for at in 4..8 {
+        for (at, row) in rows.iter().enumerate().skip(4) {
             #[expect(clippy::cast_precision_loss)]
             let expected = eight.map(|field| (10 * field + at) as f64);
-            assert_eq!(rows[at].0, expected);
+            assert_eq!(row.0, expected);
         }
         assert_eq!(records.column(8), [80.0, 81.0, 82.0, 83.0, -84.0, -85.0, -86.0, -87.0]);
         assert_eq!(records.column(0)[4..], [4.0, 5.0, 6.0, 7.0], "not wanted");

@@ -58,8 +58,8 @@ pub use super::settings::{InitialMetric, MAX_INPUTS};
 use super::growth::Wish;
 use super::lanes::run;
 use super::metric::Metric;
-use super::sample::{divide, settled};
 use super::near::Near;
+use super::sample::{divide, settled};
 use super::shapes::Shapes;
 use super::store::Store;
 use super::{BuildError, Learner, Refusal};
@@ -75,7 +75,7 @@ pub struct Rfwr {
     shapes: Shapes,
     /// All that fields know, in the order of [`Field::to_column`].
     fields: Store,
-    workshop: Workshop,
+    workshop: Box<Workshop>,
 }
 
 /// A learner as in a file.
@@ -109,7 +109,7 @@ impl Rfwr {
     /// # Errors
     /// When a setting is outside its range or a length does not fit.
     pub fn new(settings: Settings) -> Result<Self, BuildError> {
-        let workshop = Workshop::new(&settings)?;
+        let workshop = Box::new(Workshop::new(&settings)?);
         let shapes = Shapes::new(settings.inputs, settings.diag_only);
         let fields = Store::new(settings.inputs, workshop.blank(&settings));
         Ok(Self { settings, samples: 0, pruned: 0, shapes, fields, workshop })
@@ -264,7 +264,9 @@ impl TryFrom<Stored> for Rfwr {
         if let Some(field) = stored.iter().position(|field| !field.is_sound(workshop.size)) {
             return Err(BuildError::Field { field });
         }
-        stored.iter().for_each(|field| fields.push(&field.to_column()));
+        for field in &stored {
+            fields.push(&field.to_column());
+        }
         Ok(Self { settings, samples, pruned, shapes, fields, workshop })
     }
 }

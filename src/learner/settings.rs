@@ -54,7 +54,11 @@ impl InitialMetric {
         // nalgebra stores by columns: Mᵀ by columns is M by rows.
         let (d, m) = (matrix.as_slice().to_vec(), lower.as_slice().to_vec());
         let positive = diagonal(&d, n).iter().all(|&d| d >= f64::MIN_POSITIVE);
-        if positive && all_finite(&d) && all_finite(&m) { Ok((d, m)) } else { Err(BuildError::NoMetric) }
+        if positive && all_finite(&d) && all_finite(&m) {
+            Ok((d, m))
+        } else {
+            Err(BuildError::NoMetric)
+        }
     }
 }
 

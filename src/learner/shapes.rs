@@ -55,7 +55,11 @@ impl Shapes {
     pub fn new(inputs: usize, diagonal: bool) -> Self {
         let entries = if diagonal { inputs } else { triangle(inputs) };
         // Nothing is near a centre that is nowhere.
-        Self { inputs, diagonal_only: diagonal, columns: Columns::new(vec![f64::NAN; inputs + entries]) }
+        Self {
+            inputs,
+            diagonal_only: diagonal,
+            columns: Columns::new(vec![f64::NAN; inputs + entries]),
+        }
     }
 
     /// Whether this holds `fields` fields of `inputs` dimensions.
@@ -72,7 +76,6 @@ impl Shapes {
     pub fn blocks(&self) -> usize {
         self.columns.blocks()
     }
-
 
     /// The centre of `field`.
     pub fn centre(&self, field: usize) -> Vec<f64> {

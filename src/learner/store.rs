@@ -123,9 +123,16 @@ impl Store {
                 records.gather(simd, eight, range, room);
                 room
             }
-            Self::Columns(columns) => {
-                &columns.block(eight[0] / LANES)[range.start..][..room.len()]
-            }
+            Self::Columns(columns) => &columns.block(eight[0] / LANES)[range.start..][..room.len()],
+        }
+    }
+
+    /// The rows from `start` on that [`rows`](Self::rows) gave, and left in `room`.
+    #[inline(always)]
+    pub fn rows_again<'a>(&'a self, eight: &Eight, start: usize, room: &'a [Row]) -> &'a [Row] {
+        match self {
+            Self::Records(_) => room,
+            Self::Columns(columns) => &columns.block(eight[0] / LANES)[start..][..room.len()],
         }
     }
 

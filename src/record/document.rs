@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::error::Category;
 
-use super::{Error, finite};
+use super::{Error, finite, layout};
 
 /// The version of the files' form. A newer one is refused.
 const SCHEMA: u32 = 1;
@@ -37,6 +37,20 @@ struct Stamp {
     kind: Option<String>,
 }
 
+/// The text of `document`, which is to stand in `path`.
+///
+/// # Errors
+/// When it holds a number that is not finite.
+pub(super) fn text<T: Document + Serialize>(path: &Path, document: &T) -> Result<Vec<u8>, Error> {
+    finite::check(document)
+        .map_err(|fault| Error::unfit(path, format!("not written, since {fault}")))?;
+    let stamped = Stamped { schema: SCHEMA, program: "coadapt", kind: T::KIND, body: document };
+    let text = if T::PRETTY { layout::to_vec(&stamped) } else { serde_json::to_vec(&stamped) };
+    let mut text = text.map_err(|e| Error::unfit(path, format!("not written: {e}")))?;
+    text.push(b'\n');
+    Ok(text)
+}
+
 /// Replaces `path` whole by `document`: a reader, or a resume after a kill, finds the old
 /// file or the new one. `durable` also outlives a loss of power.
 ///
@@ -48,14 +62,7 @@ pub(super) fn write<T: Document + Serialize>(
     document: &T,
     durable: bool,
 ) -> Result<(), Error> {
-    finite::check(document)
-        .map_err(|fault| Error::unfit(path, format!("not written, since {fault}")))?;
-    let stamped = Stamped { schema: SCHEMA, program: "coadapt", kind: T::KIND, body: document };
-    let text =
-        if T::PRETTY { serde_json::to_vec_pretty(&stamped) } else { serde_json::to_vec(&stamped) };
-    let mut text = text.map_err(|e| Error::unfit(path, format!("not written: {e}")))?;
-    text.push(b'\n');
-    replace(path, &text, durable)
+    replace(path, &text(path, document)?, durable)
 }
 
 /// Replaces the file at `path` whole by `bytes`.

@@ -45,15 +45,9 @@ pub(super) fn order_policy(
     };
     let policy: record::Policy<Model> = record::read_policy(&path).map_err(|e| usage(&e))?;
     let task = profile.experiment.task(profile.tick());
-    let wanted = task.feature_names().len();
-    if policy.task != task.name() || policy.learner.inputs() != wanted {
-        return Err(RunError::Usage(format!(
-            "{}: this policy is for {} with {} inputs, not for {} with {wanted}",
-            path.display(),
-            policy.task,
-            policy.learner.inputs(),
-            task.name(),
-        )));
+    let columns = (policy.learner.inputs(), policy.learner.outputs());
+    if let Some(misfit) = policy.misfit(task.name(), task.feature_names(), columns) {
+        return Err(RunError::Usage(format!("{}: {misfit}", path.display())));
     }
     let given = order.sets.iter().any(|(key, _)| key == "mode");
     if given && profile.mode.fixed() != Some(policy.mode) {

@@ -325,6 +325,7 @@ impl Parts {
             preset: sidecar.preset.clone(),
             mode: sidecar.mode,
             features: task.feature_names().iter().map(|name| (*name).to_owned()).collect(),
+            output: profile.teaching.target.column().to_owned(),
             action_limit: task.action_limit(),
         };
         let mut scribe = Scribe::new(recorder, origin, plan.clone(), tenths, company.stamp());

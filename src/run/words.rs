@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::{RunError, say, wants_colour};
 use crate::cli;
-use crate::learner::Model;
+use crate::learner::{Learner, Model};
 use crate::profile::{self, Document, Profile};
 use crate::record::{self, Policy};
 use crate::report::metrics;
@@ -103,19 +103,22 @@ pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
     let mut profile = match (&words.profile, recorded) {
         (Some(name), _) => document(name, &[])?,
         (None, Some(text)) => Document::from_text("session.json", text),
+        (None, None) if policy.task == record::policy::TABLE => {
+            return Err(usage(format_args!(
+                "{} was learned from a table, so no task is known: give --profile",
+                file.display()
+            )));
+        }
         (None, None) => document(&policy.task, &[])?,
     };
     if let Some(starts) = words.starts {
         profile.set("session.autonomous_rollouts", &starts.to_string());
     }
     let profile = read(&profile)?;
-    if profile.experiment.name() != policy.task {
-        return Err(usage(format_args!(
-            "{} is a policy for {}, and the profile is for {}",
-            file.display(),
-            policy.task,
-            profile.experiment.name()
-        )));
+    let features = profile.experiment.task(profile.tick()).feature_names();
+    let columns = (policy.learner.inputs(), policy.learner.outputs());
+    if let Some(misfit) = policy.misfit(profile.experiment.name(), features, columns) {
+        return Err(usage(format_args!("{}: {misfit}", file.display())));
     }
     let rows =
         evaluation::autonomous(&profile, &policy.learner, words.seed, || false).unwrap_or_default();
@@ -126,7 +129,7 @@ pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
         let evaluation = Evaluation {
             schema: 1,
             policy: file.display().to_string(),
-            task: policy.task,
+            task: profile.experiment.name().to_owned(),
             preset: policy.preset,
             seed: words.seed,
             episodes: measures.episodes,

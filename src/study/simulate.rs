@@ -2,6 +2,7 @@
 
 use std::io::{self, Read, Write};
 
+use super::table::{MOST_FAULTS, Table, TableError};
 use crate::profile::Profile;
 use crate::random::{Place, Purpose, stream};
 use crate::signal::{Action, State};
@@ -34,16 +35,14 @@ pub enum SimulateError {
         /// The table's name.
         table: String,
     },
-    /// The table of actions has faults.
-    #[error("{}", .0.join("\n"))]
-    Actions(Vec<String>),
+    /// The table of actions cannot be read, or has faults.
+    #[error(transparent)]
+    Actions(#[from] TableError),
     /// Writing failed.
     #[error("the table of states could not be written: {0}")]
     Io(#[from] io::Error),
 }
 
-/// The most faults of a table that are told.
-const MOST_FAULTS: usize = 20;
 /// The most that is read of a table, bytes: days of actions.
 const MOST_BYTES: u64 = 64 << 20;
 
@@ -91,42 +90,23 @@ pub fn actions(name: &str, table: impl Read) -> Result<Vec<f64>, SimulateError> 
 }
 
 fn actions_of(name: &str, table: impl Read) -> Result<Vec<f64>, SimulateError> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(table);
-    let told = |error: &csv::Error| format!("{name}: {error}");
-    let headers = reader.headers().map_err(|e| SimulateError::Actions(vec![told(&e)]))?.clone();
-    let Some(column) = headers.iter().position(|header| header == "u") else {
-        let found = headers.iter().take(10).collect::<Vec<_>>().join(",");
-        return Err(SimulateError::Actions(vec![format!(
-            "{name}, line 1: there is no column `u`, only {found:?}; the first line names the \
-             columns, then follows one action a control step"
-        )]));
-    };
+    let mut table = Table::open(name, table, &["u".to_owned()])?;
     let mut actions = Vec::new();
     let mut faults = Vec::new();
-    for record in reader.records() {
-        let record = match record {
-            Ok(record) => record,
-            Err(error) => {
-                faults.push(told(&error));
-                break;
-            }
-        };
-        let cell = record.get(column).unwrap_or("");
-        match cell.parse::<f64>() {
-            Ok(action) if action.is_finite() => actions.push(action),
-            _ => {
-                let line = record.position().map_or(0, csv::Position::line);
-                faults.push(format!(
-                    "{name}, line {line}, column u: {cell:?} is not a finite number"
-                ));
-            }
+    let mut row = [0.0];
+    while table.next(&mut row)? {
+        let [action] = row;
+        if action.is_finite() {
+            actions.push(action);
+            continue;
         }
+        faults.push(format!("{name}, line {}, column u: {action} is not finite", table.line()));
         if faults.len() >= MOST_FAULTS {
             faults.push("further lines were not read".to_owned());
             break;
         }
     }
-    if faults.is_empty() { Ok(actions) } else { Err(SimulateError::Actions(faults)) }
+    if faults.is_empty() { Ok(actions) } else { Err(TableError::Faults(faults).into()) }
 }
 
 /// Lets the plant go from `start` under `actions`, clipped to the plant's limit, and
@@ -193,15 +173,29 @@ mod tests {
     fn all_wrong_actions_are_named_at_once() {
         assert_eq!(actions("f", "u\n1\n-2.5\n".as_bytes()).unwrap(), [1.0, -2.5]);
         let told = |text: &str| actions("f.csv", text.as_bytes()).unwrap_err().to_string();
-        let message = told("u\n1\nNaN\n\"x\"\n");
-        assert!(message.contains("line 3") && message.contains("line 4"), "{message}");
-        assert!(told("v\n1\n").contains("no column `u`"));
+        let message = told("u\nx\n1\n\"y\"\n");
+        assert!(message.contains("line 2") && message.contains("line 4"), "{message}");
+        assert!(told("v\n1\n").contains("no column u"));
+    }
+
+    /// Lines without end.
+    struct Lines;
+
+    impl Read for Lines {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            for (at, byte) in buffer.iter_mut().enumerate() {
+                *byte = if at % 2 == 0 { b'1' } else { b'\n' };
+            }
+            Ok(buffer.len() / 2 * 2)
+        }
     }
 
     #[test]
     fn a_table_without_end_is_refused() {
         let message = actions("noise", io::repeat(b'x')).unwrap_err().to_string();
-        assert!(message.contains("noise is too large"), "{message}");
+        assert!(message.contains("noise") && message.contains("1 MiB"), "{message}");
+        let message = actions("ones", "u\n".as_bytes().chain(Lines)).unwrap_err().to_string();
+        assert!(message.contains("ones is too large"), "{message}");
     }
 
     #[test]

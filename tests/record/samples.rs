@@ -117,7 +117,8 @@ pub fn a_policy(learner: Model) -> Policy<Model> {
         mode: Mode::Sequential,
         percent: 100,
         features: COLUMNS.map(str::to_owned).to_vec(),
-        action_limit: 10.0,
+        outputs: vec!["u_human".to_owned()],
+        action_limit: Some(10.0),
         learner,
     }
 }

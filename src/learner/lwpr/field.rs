@@ -264,8 +264,7 @@ impl Projection {
         let Self { n_data, lambda, sum_w, sum_e_cv2, ss_s2, ss_y_res, h, r, per_length, .. } =
             *self;
         let per_s2 = 1.0 / ss_s2;
-        let scalars =
-            [n_data, sum_w, sum_e_cv2, ss_y_res, per_s2, per_length, ss_s2, lambda, h, r];
+        let scalars = [n_data, sum_w, sum_e_cv2, ss_y_res, per_s2, per_length, ss_s2, lambda, h, r];
         filled_up([&scalars[..], &self.s_x_res_y_res, &self.ss_x_res].concat())
     }
 

@@ -4,8 +4,7 @@ use fearless_simd::prelude::*;
 
 use super::field::{
     BASE_SCALARS, Base, COUNT, H, LAMBDA, N_DATA, NEARLY_NOTHING, OFFSET, PER_LENGTH, PER_S2,
-    ProjectionRows, R, SS_P, SS_S2,
-    SS_Y_RES, SUM_E_CV2, SUM_E2, SUM_W, Size, TRUSTWORTHY,
+    ProjectionRows, R, SS_P, SS_S2, SS_Y_RES, SUM_E_CV2, SUM_E2, SUM_W, Size, TRUSTWORTHY,
 };
 use super::settings::Settings;
 use crate::learner::lanes::{Cut, Lanes, Mask, Row, all, dot, fused, without};
@@ -32,7 +31,7 @@ pub struct Findings {
     pub s: Vec<Row>,
     /// The errors before learning, of projections 1 to j together (up to n).
     e_cvs: Vec<Row>,
-    /// 1 / SSs2 of each projection (up to n).
+    /// 1 / Σ ws² of each projection (up to n).
     pub per_s2: Vec<Row>,
     /// The error before learning, of the projections that count.
     pub e_cv: Row,
@@ -75,7 +74,7 @@ pub struct Speech<'a, S: Simd> {
     ss_p: Lanes<S>,
     /// What is left of x − x̄ (n).
     residual: &'a mut [Row],
-    /// Σ s²/SSs2.
+    /// Σ s² / Σ ws².
     leverage: Lanes<S>,
     /// The sum of squared errors of the last projection that counts, of the first in any
     /// case, and its sum of weights.
@@ -244,8 +243,7 @@ impl<'a, S: Simd> Speech<'a, S> {
         self.leverage = fused(s, pull, self.leverage);
         projection.account(simd, pull, self.residual);
         let heard = if j == 0 { Mask::splat(simd, true) } else { counts };
-        let (errors, sum_w) =
-            (projection.scalar(simd, SUM_E_CV2), projection.scalar(simd, SUM_W));
+        let (errors, sum_w) = (projection.scalar(simd, SUM_E_CV2), projection.scalar(simd, SUM_W));
         self.spread = (heard.select(errors, self.spread.0), heard.select(sum_w, self.spread.1));
     }
 
@@ -439,7 +437,8 @@ impl Rows<&[Row]> {
         let mut error_before = all(simd, 0.0);
         for j in 0..old.depth() {
             let (projection, before) = (self.projection(j), old.projection(j));
-            let error = projection.scalar(simd, SUM_E_CV2) / projection.scalar(simd, SUM_W) + NEARLY_NOTHING;
+            let error = projection.scalar(simd, SUM_E_CV2) / projection.scalar(simd, SUM_W)
+                + NEARLY_NOTHING;
             let n_data = before.scalar(simd, N_DATA);
             let lambda = before.scalar(simd, LAMBDA);
             if j > 0 {
@@ -482,7 +481,7 @@ impl ProjectionRows<&[Row]> {
 impl ProjectionRows<&mut [Row]> {
     /// Becomes what comes after the projection `before`, which saw `s` and should explain
     /// `target`. The residual becomes that of the next projection, still by the old P.
-    /// Returns 1 / SSs2.
+    /// Returns 1 / Σ ws².
     #[inline(always)]
     fn learn<S: Simd>(
         self,

@@ -57,8 +57,8 @@ impl Reckoning {
         let transient = ratio2 * ratio2;
         let transient = transient.simd_gt(1.0).select(one, transient);
         let e_cv2 = e_cv * e_cv;
-        let j1_slope = (e_cv2 - spread * share - (e * through_slopes + through_variances) * 2.0)
-            * share;
+        let j1_slope =
+            (e_cv2 - spread * share - (e * through_slopes + through_variances) * 2.0) * share;
         let j1_curvature = if self.meta {
             ((e * e * leverage - e_cv2 * share) * 2.0
                 + spread * share * share

@@ -115,7 +115,9 @@ impl Submodel {
             return Err(BuildError::Field { field });
         }
         let mut submodel = Self { pruned, shapes, ..Self::new(settings, shop) };
-        fields.iter().for_each(|field| submodel.push(field, settings));
+        for field in &fields {
+            submodel.push(field, settings);
+        }
         Ok(submodel)
     }
 

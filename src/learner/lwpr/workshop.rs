@@ -155,8 +155,6 @@ impl Work for Teach<'_> {
 }
 
 impl Teach<'_> {
-
-
     /// Lets the active ones of eight fields learn the sample: regression first and then
     /// shape. Each part is learned aside, and taken over where it is sound. Leaves what the
     /// fields say in between, and returns the weights of those that speak.
@@ -210,12 +208,7 @@ impl Teach<'_> {
             &mut *self.shop;
         let start = size.metric();
         let (room, known) = room[..end].split_at_mut(start);
-        let known = if self.fields.gathers() {
-            &*known
-        } else {
-            self.fields.rows(simd, &eight, start..end, known)
-        };
-        let old = Rows::new(size, known);
+        let old = Rows::new(size, self.fields.rows_again(&eight, start, known));
         let mask = mask & old.is_ripe(simd, old.first(simd, N_DATA));
         if mask.all_false() {
             return;

@@ -246,7 +246,7 @@ impl Field {
         let scalars = [trustworthy, regression.n_data, regression.lambda, regression.sum_w];
         let mut numbers = Vec::new();
         let mut append = |parts: &[&[f64]]| {
-            parts.iter().for_each(|part| numbers.extend_from_slice(part));
+            numbers.extend(parts.concat());
             numbers.resize(padded(numbers.len()), 0.0);
         };
         append(&[&scalars, mean]);

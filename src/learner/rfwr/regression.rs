@@ -95,8 +95,7 @@ impl Next<'_> {
         size: Size,
         old: &Old<'_>,
         given: Given<'_, S>,
-        found: &mut Findings,
-        rules: &Settings,
+        (found, rules): (&mut Findings, &Settings),
     ) {
         let n = size.inputs;
         let lambda = old.scalars[LAMBDA].get(simd);

@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::field::Size;
 use crate::learner::BuildError;
+use crate::learner::growth;
 use crate::learner::kernel::Kernel;
 use crate::learner::settings::{BIG, InitialMetric, SMALL, check_sizes, range, start};
-use crate::learner::growth;
 use crate::learner::shapes::triangle;
 
 /// All settings of the algorithm, named as in the literature. [`Settings::new`] gives the

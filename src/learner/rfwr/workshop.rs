@@ -137,13 +137,15 @@ impl Work for Teach<'_> {
         for (sum, rows) in self.shop.blend.iter_mut().zip(&self.shop.voices) {
             *sum = total(rows.get(simd));
         }
-        Taught { voices: total(voices), strongest: window.strongest(simd, search.nearest(simd, self.shapes, &self.shop.sample.x)) }
+        Taught {
+            voices: total(voices),
+            strongest: window
+                .strongest(simd, search.nearest(simd, self.shapes, &self.shop.sample.x)),
+        }
     }
 }
 
 impl Teach<'_> {
-
-
     /// Lets the active ones of eight fields learn the sample: regression first and then
     /// shape. Each part is learned aside, and taken over where it is sound. Adds what the
     /// fields say in between to the voices, and returns their weights.
@@ -161,7 +163,7 @@ impl Teach<'_> {
         let old = size.cut_regression(rows);
         let (next, ..) = size.cut(&mut next[..]);
         let given = Given { x: &sample.x[..size.inputs], y: &sample.y, w: activation.w };
-        size.cut_regression(&mut *next).learn(simd, size, &old, given, found, self.settings);
+        size.cut_regression(&mut *next).learn(simd, size, &old, given, (found, self.settings));
         let sound = finite(simd, active & activation.w.simd_gt(0.0), next);
         let mut trusted = size.cut_regression(&*next).trustworthy(simd);
         let mut lost = active & !sound;
@@ -212,12 +214,8 @@ impl Teach<'_> {
         let (_, room) = room.split_at_mut(start);
         let old = self.fields.rows(simd, &eight, start..start + learned, room);
         let (old_errors, old_metric) = old.split_at(errors.len());
-        let heard = Heard {
-            lambda,
-            sum_w: regression.scalars[SUM_W].get(simd),
-            w: activation.w,
-            found,
-        };
+        let heard =
+            Heard { lambda, sum_w: regression.scalars[SUM_W].get(simd), w: activation.w, found };
         let old_errors = size.cut_errors(old_errors);
         let cost = size.cut_errors(&mut *errors).learn(simd, &old_errors, heard, self.settings);
         let (offset, old_d) = (&mut offset[..size.inputs], &mut d.0[..size.entries]);
@@ -310,6 +308,9 @@ impl Consult<'_> {
                 start += size.output();
             }
         }
-        Taught { voices: total(voices), strongest: window.strongest(simd, search.nearest(simd, shapes, x)) }
+        Taught {
+            voices: total(voices),
+            strongest: window.strongest(simd, search.nearest(simd, shapes, x)),
+        }
     }
 }

@@ -1,0 +1,246 @@
+//! The samples that a recorded session's learner was given, from its rows.
+
+use std::path::Path;
+
+use super::{FitError, Kept};
+use crate::learner;
+use crate::profile::{Document, Profile};
+use crate::record::{self, EpisodeRow, Sidecar, StepRow, reader};
+use crate::session::Phase;
+use crate::signal::{End, Intent};
+use crate::task::Task;
+use crate::teaching;
+
+/// The actions that a row holds.
+const ACTIONS: [&str; 4] = ["u_human", "u_machine", "u", "u_applied"];
+
+/// A recorded session as a table of samples.
+#[derive(Debug)]
+pub struct Recorded {
+    /// What is known of it.
+    pub sidecar: Sidecar,
+    /// Its learner's parameters, the norms those of the inputs.
+    pub learner: learner::Params,
+    /// The largest action.
+    pub action_limit: f64,
+    /// The names of the inputs,
+    pub inputs: Vec<String>,
+    /// and of the outputs.
+    pub outputs: Vec<String>,
+    /// The samples of its main phase, in order. Those of discarded rollouts were taken back,
+    /// and are not here.
+    pub samples: Kept,
+    /// What the person should know.
+    pub notices: Vec<String>,
+}
+
+/// Reads the session in `folder`. The inputs and outputs are those that its learner had,
+/// unless given: inputs may be the task's features and the state's columns, outputs the
+/// actions of a row.
+///
+/// # Errors
+/// When its files cannot be read, do not belong together, or lack what was asked for.
+pub fn read(
+    folder: &Path,
+    inputs: Option<&[String]>,
+    outputs: Option<&[String]>,
+) -> Result<Recorded, FitError> {
+    let file = folder.join("session.json");
+    if !file.exists() {
+        return Err(FitError::Unfit(format!(
+            "{} is no recorded session: session.json is missing; give a session's folder, such \
+             as logs/S07/001-balance-simultaneous, or a table",
+            folder.display()
+        )));
+    }
+    let sidecar = record::read_sidecar(&file)?;
+    let profile = Document::from_text("session.json", sidecar.profile_ron.clone()).read()?;
+    let mut steps = reader::Steps::open(&folder.join("steps.csv"))?;
+    let episodes = reader::Episodes::open(&folder.join("episodes.csv"))?
+        .filter(|row| row.as_ref().map_or(true, |row| row.phase == Phase::Main))
+        .collect::<Result<Vec<_>, _>>()?;
+    let task = profile.experiment.task(profile.tick());
+    let asked = Asked::of(&*task, &profile, steps.columns(), inputs, outputs)?;
+    let mut attempts = Attempts { episodes: &episodes, begun: 0, last: None, rows: 0, lost: 0 };
+    let mut samples = Kept::default();
+    for (line, row) in (2..).zip(&mut steps) {
+        let row = row?;
+        if row.phase == Phase::Main && attempts.keeps(&row)? {
+            asked.take(&*task, &profile, &row, line, &mut samples);
+        }
+    }
+    attempts.close();
+    if samples.is_empty() {
+        return Err(FitError::Unfit(format!(
+            "{} holds no samples: nobody steered in a whole rollout of its main phase",
+            folder.display()
+        )));
+    }
+    let mut notices = Vec::new();
+    if attempts.lost > 0 {
+        notices.push(format!(
+            "{} step rows of this session are missing: the fit may differ from what the session \
+             learned",
+            attempts.lost
+        ));
+    }
+    let mut learner = profile.learner.clone();
+    learner.norm_in = asked.norms(&*task, &learner.norm_in);
+    Ok(Recorded {
+        sidecar,
+        learner,
+        action_limit: task.action_limit(),
+        inputs: asked.inputs.into_iter().map(|(name, _)| name).collect(),
+        outputs: asked.outputs,
+        samples,
+        notices,
+    })
+}
+
+/// Where an input is found.
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    /// Among the task's features,
+    Feature(usize),
+    /// or the state's numbers.
+    State(usize),
+}
+
+/// What is to be taken from each row.
+struct Asked {
+    inputs: Vec<(String, Place)>,
+    outputs: Vec<String>,
+    /// Whether the outputs are the learner's own target.
+    is_lesson: bool,
+}
+
+impl Asked {
+    fn of(
+        task: &dyn Task,
+        profile: &Profile,
+        columns: &[String],
+        inputs: Option<&[String]>,
+        outputs: Option<&[String]>,
+    ) -> Result<Self, FitError> {
+        let features = task.feature_names();
+        let place = |name: &String| {
+            let feature = features.iter().position(|feature| feature == name);
+            let state = || columns.iter().position(|column| column == name);
+            feature.map(Place::Feature).or_else(|| state().map(Place::State))
+        };
+        let all: Vec<String> = features.iter().map(|name| (*name).to_owned()).collect();
+        let inputs = inputs.unwrap_or(&all);
+        let target = profile.teaching.target.column();
+        let given = outputs.map(<[String]>::to_vec);
+        let outputs = given.unwrap_or_else(|| vec![target.to_owned()]);
+        let mut faults = Vec::new();
+        for name in inputs.iter().filter(|name| place(name).is_none()) {
+            let known = all.join(",");
+            faults.push(format!("--inputs: this session has no {name}; it has {known}"));
+        }
+        for name in outputs.iter().filter(|name| !ACTIONS.contains(&name.as_str())) {
+            let known = ACTIONS.join(",");
+            faults.push(format!("--outputs: this session has no {name}; it has {known}"));
+        }
+        if !faults.is_empty() {
+            return Err(FitError::Unfit(faults.join("\n")));
+        }
+        let inputs = inputs.iter().filter_map(|name| Some((name.clone(), place(name)?)));
+        let is_lesson = outputs == [target];
+        Ok(Self { inputs: inputs.collect(), outputs, is_lesson })
+    }
+
+    /// Adds the sample in `row`, if it holds one.
+    fn take(
+        &self,
+        task: &dyn Task,
+        profile: &Profile,
+        row: &StepRow<String>,
+        line: u64,
+        samples: &mut Kept,
+    ) {
+        let features = task.features(&row.state);
+        let human = row.u_human.map_or(Intent::Absent, Intent::fresh);
+        let applied = row.u_applied.unwrap_or(0.0);
+        let lesson = teaching::lesson(&profile.teaching, features, human, applied);
+        let weight = lesson.map_or(1.0, |lesson| lesson.weight);
+        let seen = lesson.map_or(features, |lesson| lesson.x);
+        let outputs: Option<Vec<f64>> = if self.is_lesson {
+            lesson.map(|lesson| vec![lesson.y])
+        } else {
+            self.outputs.iter().map(|name| action(row, name)).collect()
+        };
+        let input = |(_, place): &(String, Place)| match *place {
+            Place::Feature(index) => seen.get(index).copied(),
+            Place::State(index) => row.state.get(index).copied(),
+        };
+        let inputs: Option<Vec<f64>> = self.inputs.iter().map(input).collect();
+        if let (Some(x), Some(y)) = (inputs, outputs) {
+            samples.push((&x, &y, weight), line);
+        }
+    }
+
+    /// The norms of the inputs: the profile's for features, 1 for others.
+    fn norms(&self, task: &dyn Task, norms: &[f64]) -> Vec<f64> {
+        let features = task.feature_names().len();
+        let norm = |(_, place): &(String, Place)| match *place {
+            Place::Feature(index) if norms.len() == features => norms.get(index).copied(),
+            _ => None,
+        };
+        self.inputs.iter().map(|input| norm(input).unwrap_or(1.0)).collect()
+    }
+}
+
+fn action(row: &StepRow<String>, name: &str) -> Option<f64> {
+    match name {
+        "u_human" => row.u_human,
+        "u_machine" => row.u_machine,
+        "u" => row.u,
+        _ => row.u_applied,
+    }
+}
+
+/// The rollouts of main as `episodes.csv` lists them, repeated ones each on their own,
+/// beside the rows of `steps.csv`.
+struct Attempts<'a> {
+    episodes: &'a [EpisodeRow],
+    /// How many were begun.
+    begun: usize,
+    /// The episode and step of the last row.
+    last: Option<(u32, u32)>,
+    /// Rows of the one under way.
+    rows: u32,
+    /// Rows that should be there.
+    lost: u64,
+}
+
+impl Attempts<'_> {
+    /// Whether the learner kept what it learned from `row`, the next one of main. Rows of a
+    /// rollout that was cut are not in the learner that would go on, nor here.
+    fn keeps(&mut self, row: &StepRow<String>) -> Result<bool, FitError> {
+        let goes_on =
+            self.last.is_some_and(|(episode, step)| episode == row.episode && step < row.step);
+        if !goes_on {
+            self.close();
+            self.begun += 1;
+            self.rows = 0;
+        }
+        self.last = Some((row.episode, row.step));
+        self.rows += u32::from(row.u_applied.is_some());
+        match self.episodes.get(self.begun - 1) {
+            None => Ok(false),
+            Some(episode) if episode.episode == row.episode => Ok(episode.end != End::Discarded),
+            Some(episode) => Err(FitError::Unfit(format!(
+                "steps.csv has rows of rollout {} of main where episodes.csv lists rollout {}; \
+                 the files do not belong together",
+                row.episode, episode.episode
+            ))),
+        }
+    }
+
+    /// The rollout under way has no further rows.
+    fn close(&mut self) {
+        let episode = self.begun.checked_sub(1).and_then(|index| self.episodes.get(index));
+        self.lost += episode.map_or(0, |e| u64::from(e.steps.saturating_sub(self.rows)));
+    }
+}
