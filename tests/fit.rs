@@ -4,8 +4,9 @@
 
 #[path = "program/desk.rs"]
 mod desk;
+#[path = "learner/feed.rs"]
+mod feed;
 #[path = "learner/golden.rs"]
-#[expect(dead_code, reason = "other tests use the rest")]
 mod golden;
 
 use std::fmt::Write as _;
@@ -135,7 +136,7 @@ fn rfwr_follows_its_golden_runs() {
 fn bent(rows: u32) -> String {
     let mut table = "a,b,u\n".to_owned();
     for k in 0..rows {
-        let ([a, b], [u]) = golden::sample(k);
+        let ([a, b], [u]) = feed::sample(k);
         writeln!(table, "{a},{b},{u}").unwrap();
     }
     table
@@ -149,7 +150,7 @@ fn the_errors_are_those_of_each_sample_before_it_is_learned_and_of_the_final_lea
     fs::write(desk.at("bent.csv"), bent(1000)).unwrap();
     let results = results(&desk.succeed(&format!("{BENT} --json")));
     let mut model = Model::Rfwr(rfwr::Rfwr::new(rfwr::Settings::new(2, 1)).unwrap());
-    let samples: Vec<_> = (0..1000).map(golden::sample).collect();
+    let samples: Vec<_> = (0..1000).map(feed::sample).collect();
     let mut squared = 0.0;
     for (x, y) in &samples {
         let mut guess = [0.0];

@@ -44,9 +44,11 @@
 //! diagonal is positive; otherwise the field drops that sample, or that step of its metric.
 
 mod field;
+mod projection;
 mod regression;
 mod settings;
 mod shaping;
+mod speech;
 mod submodel;
 mod workshop;
 

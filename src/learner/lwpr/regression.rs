@@ -3,15 +3,14 @@
 use fearless_simd::prelude::*;
 
 use super::field::{
-    BASE_SCALARS, Base, COUNT, H, LAMBDA, N_DATA, NEARLY_NOTHING, OFFSET, PER_LENGTH, PER_S2,
-    ProjectionRows, R, SS_P, SS_S2, SS_Y_RES, SUM_E_CV2, SUM_E2, SUM_W, Size, TRUSTWORTHY,
+    Base, COUNT, H, LAMBDA, N_DATA, NEARLY_NOTHING, OFFSET, PER_S2, ProjectionRows, R, SS_P,
+    SS_Y_RES, SUM_E_CV2, SUM_E2, SUM_W, Size, TRUSTWORTHY,
 };
 use super::settings::Settings;
-use crate::learner::lanes::{Cut, Lanes, Mask, Row, all, dot, fused, without};
+use super::speech::{Speech, count, counts, enough};
+use crate::learner::lanes::{Cut, Lanes, Mask, Row, all, fused};
 use crate::learner::settings::MAX_INPUTS;
 
-/// The direction of a projection turns only to a vector whose square is larger than this.
-const LEAST_SQUARE: f64 = 1e-24;
 /// What [`ripeness`] must exceed for errors to be counted and shapes learned.
 pub const RIPE: f64 = 0.1;
 /// The same for a projection before the next one is added.
@@ -21,7 +20,7 @@ const FRESH: f64 = 0.5;
 /// A projection has seen as much as the first one when its count is this share of it.
 const AS_MUCH: f64 = 0.99;
 
-/// What the regressions found about a sample, for the metric; every four fields
+/// What the regressions found about a sample, for the metric; every eight fields
 /// overwrite it.
 #[derive(Clone, Debug)]
 pub struct Findings {
@@ -60,25 +59,6 @@ pub struct Rows<T> {
     base: T,
     /// The rows of the projections that any of the fields has.
     projections: T,
-}
-
-/// Eight fields on their way to say something about an input, projection after projection.
-pub struct Speech<'a, S: Simd> {
-    size: Size,
-    /// The outputs, normalised.
-    pub y: Lanes<S>,
-    /// Where fields may speak.
-    pub trustworthy: Mask<S>,
-    /// How many projections they have.
-    count: Lanes<S>,
-    ss_p: Lanes<S>,
-    /// What is left of x − x̄ (n).
-    residual: &'a mut [Row],
-    /// Σ s² / Σ ws².
-    leverage: Lanes<S>,
-    /// The sum of squared errors of the last projection that counts, of the first in any
-    /// case, and its sum of weights.
-    spread: (Lanes<S>, Lanes<S>),
 }
 
 impl Findings {
@@ -205,66 +185,6 @@ impl<'a> Rows<&'a [Row]> {
         }
         speech.y
     }
-}
-
-impl<'a, S: Simd> Speech<'a, S> {
-    /// Begins with the rows of the base, as many as predictions need. `residual` is room for
-    /// n rows.
-    #[inline(always)]
-    pub fn begin(
-        simd: S,
-        size: Size,
-        base: &[Row],
-        (x, residual): (&[f64], &'a mut [Row]),
-    ) -> Self {
-        for ((residual, mean), &x) in residual.iter_mut().zip(&base[BASE_SCALARS..]).zip(x) {
-            residual.set(all(simd, x) - mean.get(simd));
-        }
-        Self {
-            size,
-            y: base[OFFSET].get(simd),
-            trustworthy: base[TRUSTWORTHY].get(simd).simd_gt(0.0),
-            count: base[COUNT].get(simd),
-            ss_p: base[SS_P].get(simd),
-            residual,
-            leverage: all(simd, 0.0),
-            spread: (all(simd, 0.0), all(simd, 1.0)),
-        }
-    }
-
-    /// Adds what projection `j` says, by as many of its rows as predictions need.
-    #[inline(always)]
-    pub fn hear(&mut self, simd: S, j: usize, rows: &[Row]) {
-        let projection = self.size.cut_projection(rows);
-        let counts = counts(self.size, self.count - count(j), projection.scalar(simd, N_DATA));
-        let s = counts.select(projection.see(simd, j, self.residual), all(simd, 0.0));
-        let pull = s * projection.scalar(simd, PER_S2);
-        self.y = fused(projection.scalar(simd, SS_Y_RES), pull, self.y);
-        self.leverage = fused(s, pull, self.leverage);
-        projection.account(simd, pull, self.residual);
-        let heard = if j == 0 { Mask::splat(simd, true) } else { counts };
-        let (errors, sum_w) = (projection.scalar(simd, SUM_E_CV2), projection.scalar(simd, SUM_W));
-        self.spread = (heard.select(errors, self.spread.0), heard.select(sum_w, self.spread.1));
-    }
-
-    /// The variances of what was said, where the activations are `w`.
-    #[inline(always)]
-    pub fn variance(&self, w: Lanes<S>) -> Lanes<S> {
-        let noise = self.spread.0 / (self.spread.1 - self.ss_p);
-        noise * (w * self.leverage + 1.0)
-    }
-}
-
-/// Where a projection of so many samples counts in predictions, if there are `after` from it
-/// on: the last one only if it has seen enough.
-#[inline(always)]
-fn counts<S: Simd>(size: Size, after: Lanes<S>, n_data: Lanes<S>) -> Mask<S> {
-    after.simd_gt(1.0) | after.simd_gt(0.0) & n_data.simd_gt(enough(size))
-}
-
-/// So many samples are enough to speak.
-fn enough(size: Size) -> f64 {
-    2.0 * count(size.inputs)
 }
 
 impl Rows<&mut [Row]> {
@@ -452,82 +372,4 @@ impl Rows<&[Row]> {
         }
         wanting
     }
-}
-
-impl ProjectionRows<&[Row]> {
-    /// One of its scalars.
-    #[inline(always)]
-    pub fn scalar<S: Simd>(&self, simd: S, at: usize) -> Lanes<S> {
-        self.scalars[at].get(simd)
-    }
-
-    /// s: what lies along the directions of projection `j`.
-    #[inline(always)]
-    fn see<S: Simd>(&self, simd: S, j: usize, residual: &[Row]) -> Lanes<S> {
-        let per_length = self.scalar(simd, PER_LENGTH);
-        let along = dot(simd, self.s_x_res_y_res, residual) * per_length;
-        per_length.simd_gt(0.0).select(along, residual[j].get(simd))
-    }
-
-    /// Takes off `residual` what the projection accounts for, where `pull` is s / Σ ws².
-    #[inline(always)]
-    fn account<S: Simd>(&self, simd: S, pull: Lanes<S>, residual: &mut [Row]) {
-        for (residual, sum) in residual.iter_mut().zip(self.ss_x_res) {
-            residual.set(without(residual.get(simd), sum.get(simd), pull));
-        }
-    }
-}
-
-impl ProjectionRows<&mut [Row]> {
-    /// Becomes what comes after the projection `before`, which saw `s` and should explain
-    /// `target`. The residual becomes that of the next projection, still by the old P.
-    /// Returns 1 / Σ ws².
-    #[inline(always)]
-    fn learn<S: Simd>(
-        self,
-        simd: S,
-        before: &ProjectionRows<&[Row]>,
-        (w, s, target): (Lanes<S>, Lanes<S>, Lanes<S>),
-        (residual, settings): (&mut [Row], &Settings),
-    ) -> Lanes<S> {
-        let lambda = before.scalar(simd, LAMBDA);
-        let (turning, pull) = (w * target, w * s);
-        let ss_s2 = fused(lambda, before.scalar(simd, SS_S2), pull * s);
-        let ss_y_res = fused(lambda, before.scalar(simd, SS_Y_RES), turning * s);
-        let per_s2 = all(simd, 1.0) / ss_s2;
-        self.scalars[SUM_W].set(fused(lambda, before.scalar(simd, SUM_W), w));
-        self.scalars[SS_S2].set(ss_s2);
-        self.scalars[SS_Y_RES].set(ss_y_res);
-        self.scalars[PER_S2].set(per_s2);
-        let (tau, end) = (settings.tau_lambda, settings.final_lambda);
-        self.scalars[N_DATA].set(before.scalar(simd, N_DATA) * lambda + 1.0);
-        self.scalars[LAMBDA].set(lambda * tau + end * (1.0 - tau));
-        (self.scalars[H], self.scalars[R]) = (before.scalars[H], before.scalars[R]);
-        let kept = lambda * 0.1 + 0.9;
-        let mut square = all(simd, 0.0);
-        let passed = s * before.scalar(simd, PER_S2);
-        let before_sums = before.s_x_res_y_res.iter().zip(before.ss_x_res);
-        let sums = self.s_x_res_y_res.iter_mut().zip(self.ss_x_res);
-        for (((turned, sum), (old_turned, old_sum)), residual) in
-            sums.zip(before_sums).zip(residual)
-        {
-            let (x, old_sum) = (residual.get(simd), old_sum.get(simd));
-            let along = fused(kept, old_turned.get(simd), turning * x);
-            square = fused(along, along, square);
-            turned.set(along);
-            sum.set(fused(lambda, old_sum, pull * x));
-            residual.set(without(x, old_sum, passed));
-        }
-        let turns = square.simd_gt(LEAST_SQUARE);
-        let per_length = all(simd, 1.0) / square.sqrt();
-        let before = before.scalar(simd, PER_LENGTH);
-        self.scalars[PER_LENGTH].set(turns.select(per_length, before));
-        per_s2
-    }
-}
-
-/// A small count as a number.
-#[expect(clippy::cast_precision_loss, reason = "at most 64")]
-fn count(j: usize) -> f64 {
-    j as f64
 }

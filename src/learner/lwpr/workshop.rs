@@ -5,9 +5,10 @@ use fearless_simd::prelude::*;
 
 use super::Change;
 use super::field::{COUNT, Field, LAMBDA, N_DATA, Projection, Regression, SS_P, Size};
-use super::regression::{Findings, Given, Rows, Speech};
+use super::regression::{Findings, Given, Rows};
 use super::settings::Settings;
 use super::shaping::Reckoning;
+use super::speech::Speech;
 use super::submodel::Voices;
 use crate::learner::BuildError;
 use crate::learner::growth::Growth;
