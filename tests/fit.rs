@@ -7,6 +7,7 @@ mod desk;
 #[path = "learner/feed.rs"]
 mod feed;
 #[path = "learner/golden.rs"]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod golden;
 
 use std::fmt::Write as _;

@@ -259,3 +259,34 @@ impl Voices {
         if self.sum_w > 0.0 && deviation.is_finite() { deviation } else { UNKNOWN * norm }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fearless_simd::Level;
+
+    /// What a learner knows after a few hundred samples, taught with one vector unit.
+    fn taught(inputs: usize, level: Level) -> String {
+        let plain = Settings::new(inputs, 2);
+        let settings = Settings { diag_only: false, meta: true, w_gen: 0.3, ..plain };
+        let mut learner = Lwpr::new(settings).unwrap();
+        learner.workshop.level = level;
+        for k in 0..400 {
+            let at = |i: usize| {
+                (f64::from(k) * (0.754 + 0.1 * f64::from(u8::try_from(i).unwrap()))).fract()
+            };
+            let x: Vec<f64> = (0..inputs).map(|i| 0.6 * at(i) - 0.3).collect();
+            let y = [(3.0 * x[0]).sin(), x.iter().sum::<f64>()];
+            learner.update(&x, &y, 1.0).unwrap();
+        }
+        serde_json::to_string(&learner).unwrap()
+    }
+
+    #[test]
+    fn every_vector_unit_learns_the_same_bits() {
+        for inputs in [1, 3, 8] {
+            let plain = taught(inputs, Level::baseline());
+            assert_eq!(taught(inputs, Level::new()), plain, "{inputs} inputs");
+        }
+    }
+}

@@ -174,30 +174,56 @@ impl Records {
         start: usize,
         rows: &[Row],
     ) {
-        let (stride, count, bits) = (self.blank.len(), rows.len() / CHUNK, mask.to_bitmask());
-        let mut places = [const { 0..0 }; LANES];
+        let (bits, nobody) = (mask.to_bitmask(), self.fields);
+        let mut places = *eight;
         for (lane, place) in places.iter_mut().enumerate() {
             // What nobody wants is written where nobody is: cheaper than a decision a chunk.
-            let wanted = bits >> lane & 1 == 1;
-            let field = if wanted { eight[lane] } else { self.fields + lane };
-            let start = field * stride + start / CHUNK;
-            *place = start..start + count;
+            if bits >> lane & 1 == 0 {
+                *place = nobody + lane;
+            }
         }
+        let chunks = start / CHUNK..(start + rows.len()) / CHUNK;
         // Fails only if a field were named twice.
-        let Ok([a, b, c, d, e, f, g, h]) = self.chunks.get_disjoint_mut(places) else { return };
+        let Some(parts) = self.parts(places, &chunks) else { return };
+        let [a, b, c, d, e, f, g, h] = parts;
         for (k, rows) in rows.chunks_exact(CHUNK).enumerate() {
             let (low_a, high_a) = simd.split_f64x8(rows[0].get(simd));
             let (low_b, high_b) = simd.split_f64x8(rows[1].get(simd));
             let (low_c, high_c) = simd.split_f64x8(rows[2].get(simd));
             let (low_d, high_d) = simd.split_f64x8(rows[3].get(simd));
-            [a[k], b[k], c[k], d[k]] = chunks(transpose([low_a, low_b, low_c, low_d]));
-            [e[k], f[k], g[k], h[k]] = chunks(transpose([high_a, high_b, high_c, high_d]));
+            [a[k], b[k], c[k], d[k]] = as_chunks(transpose([low_a, low_b, low_c, low_d]));
+            [e[k], f[k], g[k], h[k]] = as_chunks(transpose([high_a, high_b, high_c, high_d]));
         }
+    }
+
+    /// These chunks of the records at eight places.
+    #[inline(always)]
+    fn parts(&mut self, places: Eight, chunks: &Range<usize>) -> Option<[&mut [Chunk]; LANES]> {
+        let stride = self.blank.len();
+        let [a, b, c, d, e, f, g, h] = places;
+        if !(a < b && b < c && c < d && d < e && e < f && f < g && g < h) {
+            let ranges =
+                places.map(|place| place * stride + chunks.start..place * stride + chunks.end);
+            return self.chunks.get_disjoint_mut(ranges).ok();
+        }
+        // Fields are found in their order, so mostly one walk will do.
+        let mut records = self.chunks.chunks_exact_mut(stride);
+        let part = chunks.clone();
+        Some([
+            &mut records.nth(a)?[part.clone()],
+            &mut records.nth(b - a - 1)?[part.clone()],
+            &mut records.nth(c - b - 1)?[part.clone()],
+            &mut records.nth(d - c - 1)?[part.clone()],
+            &mut records.nth(e - d - 1)?[part.clone()],
+            &mut records.nth(f - e - 1)?[part.clone()],
+            &mut records.nth(g - f - 1)?[part.clone()],
+            &mut records.nth(h - g - 1)?[part],
+        ])
     }
 }
 
 #[inline(always)]
-fn chunks<S: Simd>([a, b, c, d]: [f64x4<S>; CHUNK]) -> [Chunk; CHUNK] {
+fn as_chunks<S: Simd>([a, b, c, d]: [f64x4<S>; CHUNK]) -> [Chunk; CHUNK] {
     [Chunk(a.into()), Chunk(b.into()), Chunk(c.into()), Chunk(d.into())]
 }
 
