@@ -5,6 +5,7 @@
 //! Pin it to a core: `taskset -c 0 cargo bench --bench learner`.
 
 #![expect(clippy::expect_used, reason = "a benchmark that cannot be set up says why and ends")]
+#![expect(clippy::disallowed_methods, reason = "a benchmark reads clocks")]
 #![expect(clippy::print_stdout, reason = "tables are no matter of criterion's")]
 
 #[path = "../examples/common/cross.rs"]

@@ -100,7 +100,7 @@ impl Metric {
         Self { m, alpha, log_alpha, trace }
     }
 
-    /// The metric with so many entries of these numbers, as many as [`height`] says.
+    /// The metric with so many entries of these numbers, as many as `height` says.
     pub fn from_column(entries: usize, numbers: &[f64]) -> Self {
         let MetricRows { m, alpha, log_alpha, trace } = cut(entries, numbers);
         let [m, alpha, log_alpha, trace] = [m, alpha, log_alpha, trace].map(<[f64]>::to_vec);
