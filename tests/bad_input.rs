@@ -171,11 +171,11 @@ fn policies_must_be_whole_and_fitting() {
 #[test]
 fn wrong_tables_of_actions_name_their_line() {
     let desk = Desk::new();
-    fs::write(desk.at("nan.csv"), "u\n1\nNaN\n").unwrap();
+    fs::write(desk.at("nan.csv"), "u\n1\nNaN\nx\n").unwrap();
     fs::write(desk.at("columns.csv"), "force\n1\n").unwrap();
     let from =
         |start: &str, table: &str| format!("simulate balance --start {start} --actions {table}");
-    refuses(&desk, &from("0,0,0,0", "nan.csv"), &["nan.csv", "line 3"]);
+    refuses(&desk, &from("0,0,0,0", "nan.csv"), &["nan.csv", "line 3", "line 4"]);
     refuses(&desk, &from("0,0,0,0", "columns.csv"), &["columns.csv", "no column u, only force"]);
     refuses(&desk, &from("0,0,0,0", "missing.csv"), &["missing.csv", "No such file"]);
     refuses(&desk, &from("0,0", "nan.csv"), &["2 numbers", "x,x_dot,theta,theta_dot"]);

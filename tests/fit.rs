@@ -429,7 +429,8 @@ fn wrong_settings_are_refused_all_at_once_with_their_place() {
     refused("s.json", "{\"norm_in\": [1, 2, 3]}", &["s.json, line 1", "`norm_in` has 3"]);
     refused("s.json", "{\"init_d\": [[1, 2], [2, 1]], \"diag_only\": 0}", &["positive definite"]);
     refused("s.json", "{\"init_d\": [[2, 1], [1, 2]]}", &["full matrix", "diag_only: false"]);
-    refused("s.json", "{\"init_alpha\": [50, 60]}", &["one rate serves all"]);
+    refused("s.json", "{\"init_alpha\": [50, 60]}", &["one number serves all"]);
+    refused("s.ron", "(kind: rfwr, init_p: [1e10, 5.0])", &["init_p", "one number serves all"]);
     refused("s.json", "{\"cutoff_predict\": 0.1, \"cutoff_update\": 0.01}", &["one cutoff"]);
     refused("s.json", "{\"algorithm\": \"mlp\"}", &["rfwr or lwpr"]);
     refused("s.ron", "(kind: lwpr, learner: rfwr)", &["`kind` is lwpr", "another learner"]);

@@ -322,3 +322,15 @@ fn a_sample_of_weight_0_teaches_nothing() {
     rfwr.learn(&[0.1, 0.1], &[99.0], 0.5).unwrap();
     assert_ne!(rfwr.field_states(), before);
 }
+
+#[test]
+fn a_new_field_is_within_the_bounds_of_its_metric() {
+    let build = |init_d, floor, ceiling| {
+        let init_d = InitialMetric::Scalar(init_d);
+        Rfwr::new(Settings { init_d, d_floor: floor, d_ceiling: ceiling, ..Settings::new(2, 1) })
+    };
+    assert!(build(4.0, Some(4.0), Some(4.0)).is_ok());
+    for refused in [build(0.5, Some(4.0), None), build(25.0, None, Some(1.0))] {
+        assert!(refused.unwrap_err().to_string().contains("init_d"));
+    }
+}

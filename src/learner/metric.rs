@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::kernel::Activation;
 use super::lanes::{Cut, Lanes, Mask, Row, all, dot, exp, finite, fused, multiply, without};
 use super::records::padded;
-use super::sample::all_finite;
+use super::sample::{all_finite, all_sums};
 use super::shapes::{entry, on_diagonal};
 
 /// A step larger than this share of M's largest entry is held back.
@@ -117,10 +117,14 @@ impl Metric {
         numbers
     }
 
-    /// Whether all vectors have `entries` finite numbers.
+    /// Whether all vectors have `entries` finite numbers, and no rate is negative.
     pub fn is_sound(&self, entries: usize) -> bool {
         let sound = |values: &[f64]| values.len() == entries && all_finite(values);
-        sound(&self.m) && sound(&self.alpha) && sound(&self.log_alpha) && sound(&self.trace)
+        sound(&self.m)
+            && sound(&self.alpha)
+            && all_sums(&self.alpha)
+            && sound(&self.log_alpha)
+            && sound(&self.trace)
     }
 }
 

@@ -59,7 +59,8 @@ impl<S: Simd> Search<S> {
                 self.keep(block, near, q);
             } else if near.any_true() {
                 let fields = fields(simd, block);
-                self.nearest.note(fields, q);
+                // Of those that are not near, a nearer one may be in another block.
+                self.nearest.note(fields, near.select(q, all(simd, f64::INFINITY)));
                 return Some(Group { eight: indices(fields), q });
             }
         }
@@ -312,6 +313,32 @@ mod tests {
                 assert_eq!(found, expected, "{centres:?}");
                 assert!(groups.iter().flatten().all(|&(field, q)| q == centres[field].powi(2)));
             }
+        }
+    }
+
+    struct Two<'a>(&'a Shapes, bool);
+
+    impl Work for Two<'_> {
+        type Output = [Near; 2];
+
+        #[inline(always)]
+        fn with<S: Simd>(self, simd: S) -> [Near; 2] {
+            let window = Window::new(Kernel::Gaussian, 2.0, 0.001);
+            let mut search = Search::new(simd, self.1);
+            while search.next(simd, (self.0, &window), &[0.0]).is_some() {}
+            search.nearest(simd, self.0, &[0.0])
+        }
+    }
+
+    #[test]
+    fn the_nearest_two_may_be_in_blocks_without_a_near_field() {
+        let mut shapes = Shapes::new(1, true);
+        for centre in [0.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0, 6.0] {
+            shapes.push(&[centre], &[1.0]);
+        }
+        for gathers in [true, false] {
+            let two = run(Level::new(), Two(&shapes, gathers));
+            assert_eq!(two, [Some((0, 0.0)), Some((8, 36.0))], "gathers: {gathers}");
         }
     }
 }

@@ -50,6 +50,11 @@ pub fn all_finite(values: &[f64]) -> bool {
     values.iter().all(|value| value.is_finite())
 }
 
+/// Whether every number may be a sum of weights or squares: finite, and not negative.
+pub fn all_sums(values: &[f64]) -> bool {
+    values.iter().all(|&value| (0.0..=f64::MAX).contains(&value))
+}
+
 /// Divides each value by its norm.
 #[inline]
 pub fn divide(into: &mut [f64], values: &[f64], norms: &[f64]) {

@@ -66,13 +66,19 @@ impl InitialMetric {
 /// and above it.
 ///
 /// # Errors
-/// When `d` is no metric, or not diagonal where it should be.
+/// When `d` is no metric, not diagonal where it should be, or outside the bounds of M's
+/// diagonal.
 pub fn start(
     d: &InitialMetric,
     n: usize,
-    diag_only: bool,
+    (diag_only, bounds): (bool, Option<(f64, f64)>),
 ) -> Result<(Vec<f64>, Vec<f64>), BuildError> {
     let (d, m) = d.factorise(n)?;
+    if let Some((least, most)) = bounds {
+        // Told as they are set: as bounds of D.
+        let held = |m: f64| range("init_d", m * m, least * least, most * most);
+        diagonal(&m, n).into_iter().try_for_each(held)?;
+    }
     if !diag_only {
         return Ok((upper(&d, n), upper(&m, n)));
     }

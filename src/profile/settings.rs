@@ -216,12 +216,16 @@ impl LearnerFile {
                 faults.push(fault(setting, "does not fit the data", &self.source, expected));
             }
         }
-        if let Some(setting) = self.setting("init_alpha")
-            && !is_uniform(&setting.value, diag_only)
-        {
-            let expected = "one rate serves all entries of D here: give a scalar, or a matrix \
-                            whose entries are equal";
-            faults.push(fault(setting, "is not supported", &self.source, expected.to_owned()));
+        for name in ["init_alpha", "init_p"] {
+            // Off its diagonal init_p is 0.
+            let diag_only = diag_only || name == "init_p";
+            if let Some(setting) = self.setting(name)
+                && !is_uniform(&setting.value, diag_only)
+            {
+                let expected = "one number serves all entries here: give a scalar, or a matrix \
+                                whose entries are equal";
+                faults.push(fault(setting, "is not supported", &self.source, expected.to_owned()));
+            }
         }
         faults.extend(self.disagreeing(
             &["cutoff", "cutoff_update", "cutoff_predict"],
@@ -239,7 +243,7 @@ impl LearnerFile {
         let mut given = names.iter().filter_map(|name| self.setting(name));
         let Some(first) = given.next() else { return Vec::new() };
         given
-            .filter(|other| other.value != first.value)
+            .filter(|other| !other.value.says_as(&first.value))
             .map(|other| fault(other, "contradicts another key", &self.source, expected.to_owned()))
             .collect()
     }

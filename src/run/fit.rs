@@ -4,7 +4,7 @@ mod progress;
 mod results;
 mod whole;
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -248,10 +248,11 @@ fn columns_of(path: &Path) -> Result<String, RunError> {
     }
     let refused =
         |cause| usage(format_args!("the data {} cannot be read: {cause}", path.display()));
-    let file = File::open(path).map_err(refused)?;
-    if !file.metadata().map_err(refused)?.is_file() {
+    // Opening a pipe would wait for its other end.
+    if !fs::metadata(path).map_err(refused)?.is_file() {
         return Ok(String::new());
     }
+    let file = File::open(path).map_err(refused)?;
     let heads = table::heads(&path.display().to_string(), file).map_err(usage)?;
     Ok(format!("; its columns are {heads}"))
 }

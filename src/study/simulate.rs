@@ -94,7 +94,17 @@ fn actions_of(name: &str, table: impl Read) -> Result<Vec<f64>, SimulateError> {
     let mut actions = Vec::new();
     let mut faults = Vec::new();
     let mut row = [0.0];
-    while table.next(&mut row)? {
+    loop {
+        match table.next(&mut row) {
+            Ok(true) => {}
+            Ok(false) => break,
+            // All faults are told, those before this one too.
+            Err(TableError::Faults(more)) => {
+                faults.extend(more);
+                break;
+            }
+            Err(error) => return Err(error.into()),
+        }
         let [action] = row;
         if action.is_finite() {
             actions.push(action);

@@ -6,7 +6,7 @@ use super::settings::Settings;
 use crate::learner::lanes::Cut;
 use crate::learner::metric::{self, Metric};
 use crate::learner::records::padded;
-use crate::learner::sample::all_finite;
+use crate::learner::sample::{all_finite, all_sums};
 
 /// What sums that are divided by start with.
 pub const NEARLY_NOTHING: f64 = 1e-10;
@@ -272,7 +272,7 @@ impl Projection {
         self.ss_x_res.len() == n
             && self.s_x_res_y_res.len() == n
             && all_finite(&self.to_column())
-            && self.per_length >= 0.0
+            && all_sums(&[self.n_data, self.sum_w, self.sum_e_cv2, self.ss_s2, self.per_length])
             && self.axis == axis
             && 0.0 < self.lambda
             && self.lambda <= 1.0
@@ -360,6 +360,8 @@ impl Field {
         (1..=n).contains(&regression.projections.len())
             && regression.mean.len() == n
             && regression.var.len() == n
+            && all_sums(&regression.var)
+            && all_sums(&[regression.sum_e2, regression.ss_p])
             && regression.projections.iter().zip(0..).all(|(one, axis)| one.is_sound(n, axis))
             && metric.is_sound(size.entries)
             && all_finite(&self.to_column())

@@ -75,7 +75,7 @@ impl ProjectionRows<&mut [Row]> {
             sum.set(fused(lambda, old_sum, pull * x));
             residual.set(without(x, old_sum, passed));
         }
-        let turns = square.simd_gt(LEAST_SQUARE);
+        let turns = square.simd_gt(LEAST_SQUARE) & square.is_finite();
         let per_length = all(simd, 1.0) / square.sqrt();
         let before = before.scalar(simd, PER_LENGTH);
         self.scalars[PER_LENGTH].set(turns.select(per_length, before));

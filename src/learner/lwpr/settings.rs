@@ -150,7 +150,7 @@ impl Settings {
         let n = self.inputs;
         check_sizes((n, &self.norm_in), (self.outputs, &self.norm_out))?;
         self.check_ranges()?;
-        start(&self.init_d, n, self.diag_only)
+        start(&self.init_d, n, (self.diag_only, self.bounds()))
     }
 
     fn check_ranges(&self) -> Result<(), BuildError> {

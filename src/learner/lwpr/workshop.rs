@@ -325,12 +325,12 @@ impl Consult<'_> {
             let range = size.metric()..size.metric() + size.base_to_predict();
             let base = fields.rows(simd, &eight, range, &mut room[..size.base()]);
             let mut speech = Speech::begin(simd, size, base, (x, residual));
-            let speaking = window.counts(w) & speech.trustworthy;
             for j in 0..most(base[COUNT]) {
                 let range = size.height(j)..size.height(j + 1);
                 let room = &mut room[..size.projection()];
                 speech.hear(simd, j, fields.rows(simd, &eight, range, room));
             }
+            let speaking = window.counts(w) & speech.trustworthy & speech.y.is_finite();
             sum_w += speaking.select(w, zero);
             sum_wy += speaking.select(w * speech.y, zero);
             if variance {

@@ -6,7 +6,7 @@ use super::settings::Settings;
 use crate::learner::lanes::Cut;
 use crate::learner::metric::{self, Metric};
 use crate::learner::records::padded;
-use crate::learner::sample::all_finite;
+use crate::learner::sample::{all_finite, all_sums};
 use crate::learner::shapes::{entry, triangle};
 
 /// A field without its centre and its D, which lie with those of the other fields.
@@ -273,8 +273,9 @@ impl Field {
             (&errors.r, triangle(n)),
         ];
         lists.into_iter().all(|(list, length)| list.len() == length && all_finite(list))
-            && all_finite(&[regression.n_data, regression.sum_w])
-            && all_finite(&[errors.sum_e_cv2, errors.sum_e2])
+            && all_sums(&[regression.n_data, regression.sum_w])
+            && all_sums(&[errors.sum_e_cv2, errors.sum_e2])
+            && all_sums(&regression.var)
             && 0.0 < regression.lambda
             && regression.lambda <= 1.0
             && metric.is_sound(entries)

@@ -174,7 +174,7 @@ impl Teach<'_> {
                 let before = predict(simd, old.mean, size.cut_output(model), given.x);
                 said.set(sound.select(said.get(simd), before));
             }
-            lost &= worn_out(simd, old.p);
+            lost &= activation.w.simd_gt(0.0) & worn_out(simd, old.p);
         }
         let speaking = finite(simd, active & trusted, &found.y);
         let zero = all(simd, 0.0);
@@ -304,7 +304,7 @@ impl Consult<'_> {
             for sum in &mut *y {
                 let model = fields.rows(simd, &eight, start..start + size.output(), output);
                 let said = predict(simd, mean, size.cut_output(model), x);
-                *sum += total(speaking.select(w * said, zero));
+                *sum += total((speaking & said.is_finite()).select(w * said, zero));
                 start += size.output();
             }
         }

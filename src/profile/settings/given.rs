@@ -53,6 +53,16 @@ pub(super) enum Given {
     Other,
 }
 
+impl Given {
+    /// Whether two values say the same; the case of words does not matter.
+    pub(super) fn says_as(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Word(one), Self::Word(other)) => one.eq_ignore_ascii_case(other),
+            _ => self == other,
+        }
+    }
+}
+
 /// A metric as a policy's settings have it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -102,5 +102,8 @@ impl Results {
 }
 
 fn percent(error: Option<f64>) -> String {
-    error.map_or_else(|| "none, the output does not vary".to_owned(), |nmse| format!("{nmse:.4}"))
+    error.map_or_else(
+        || "none (the output does not vary, or its squares overflow)".to_owned(),
+        |nmse| format!("{nmse:.4}"),
+    )
 }
