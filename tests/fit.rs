@@ -621,4 +621,18 @@ fn a_table_with_a_tasks_columns_gives_a_policy_for_it() {
     let said = desk.succeed("evaluate p.json --profile balance --starts 3 --json");
     assert_eq!(results(&said)["episodes"], 3);
     assert_eq!(results(&said)["preset"], "table");
+    let edited =
+        fs::read_to_string(desk.at("p.json")).unwrap().replace("[\"force\"]", "[\"u\", \"v\"]");
+    fs::write(desk.at("p.json"), edited).unwrap();
+    let evaluate = "evaluate p.json --profile balance --starts 3";
+    refuses(&desk, evaluate, &["names the outputs u,v, but its learner has 1"]);
+}
+
+#[test]
+fn a_link_is_followed_even_where_it_leads_to_nothing_yet() {
+    let desk = Desk::new();
+    fs::write(desk.at("bent.csv"), bent(300)).unwrap();
+    std::os::unix::fs::symlink("there.json", desk.at("link.json")).unwrap();
+    desk.succeed(&format!("{BENT} --out link.json"));
+    assert!(desk.at("link.json").is_symlink() && desk.at("there.json").is_file());
 }

@@ -61,6 +61,12 @@ impl<M> Policy<M> {
                 features.len()
             ));
         }
+        if self.outputs.len() != columns.1 {
+            let (named, has) = (self.outputs.join(","), columns.1);
+            return Some(format!(
+                "this policy names the outputs {named}, but its learner has {has}"
+            ));
+        }
         (columns.1 != 1)
             .then(|| format!("this policy has {} outputs where {task} takes one action", columns.1))
     }

@@ -33,7 +33,10 @@ impl Whole {
         };
         let (option, shown) = (option.to_owned(), path.to_owned());
         // A link is followed, so that what it leads to is replaced and not the link.
-        let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let beside = |to| path.parent().unwrap_or(Path::new("")).join::<PathBuf>(to);
+        let place = fs::canonicalize(path)
+            .or_else(|_| fs::read_link(path).map(beside))
+            .unwrap_or_else(|_| path.to_owned());
         match fs::metadata(&place) {
             Ok(about) if about.is_dir() => {
                 return Err(refuse("this is a folder; name a file in it".to_owned()));
