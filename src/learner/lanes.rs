@@ -6,7 +6,7 @@
 //!
 //! No operation here is approximate, and none depends on the machine: all vector units, and
 //! the plain code where there is none, give the same bits. (Where a processor cannot multiply
-//! and add at once, which is none of the last ten years, [`fused`] is slow instead.)
+//! and add at once, [`fused`] is slow instead.)
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch, f64x8, i64x8, mask64x8};

@@ -10,7 +10,7 @@ use super::records::Records;
 
 /// Up to so many inputs fields are small compared with the space: few of them are active at
 /// a time, and these pay for being gathered.
-const FEW_INPUTS: usize = 6;
+pub const FEW_INPUTS: usize = 6;
 
 /// A table with the same numbers for every field.
 #[derive(Clone, Debug)]

@@ -12,7 +12,7 @@ use crate::learner::lanes::{Cut, Lanes, Mask, Row, all, fused};
 use crate::learner::settings::MAX_INPUTS;
 
 /// What [`ripeness`] must exceed for errors to be counted and shapes learned.
-pub const RIPE: f64 = 0.1;
+const RIPE: f64 = 0.1;
 /// The same for a projection before the next one is added.
 const RIPE_FOR_NEXT: f64 = 0.5;
 /// A projection with a smaller count has not seen any sample.

@@ -20,12 +20,10 @@ use crate::learner::records::padded;
 use crate::learner::sample::Sample;
 use crate::learner::settings::MAX_INPUTS;
 use crate::learner::shapes::Shapes;
-use crate::learner::store::Store;
+use crate::learner::store::{FEW_INPUTS, Store};
 
 /// The bi-square kernel ends at this q.
 const REACH: f64 = 4.0;
-/// With so few inputs the room for a prediction is small.
-const FEW_INPUTS: usize = 6;
 
 /// What follows from the settings, and room to work in, so that updates need no heap.
 #[derive(Clone, Debug)]

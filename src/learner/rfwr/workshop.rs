@@ -15,12 +15,10 @@ use crate::learner::near::{Group, Near, Search};
 use crate::learner::sample::Sample;
 use crate::learner::settings::MAX_INPUTS;
 use crate::learner::shapes::Shapes;
-use crate::learner::store::Store;
+use crate::learner::store::{FEW_INPUTS, Store};
 
 /// The bi-square kernel ends at this q.
 const REACH: f64 = 2.0;
-/// With so few inputs the room for a prediction is small.
-const FEW_INPUTS: usize = 6;
 /// P beyond this is no knowledge but the outcome of forgetting without new directions.
 const WORN_OUT: f64 = 1e100;
 
