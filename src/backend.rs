@@ -29,4 +29,8 @@ pub trait Backend: Send {
     /// Brings the plant to `start` and holds it there. `place` names the rollout, whose
     /// chance a simulated plant draws from.
     fn prepare(&mut self, start: State, place: Place);
+
+    /// The plant goes on where it is, but its chance is that of the rollout `place` from
+    /// now on.
+    fn go_on(&mut self, place: Place);
 }

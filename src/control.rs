@@ -2,6 +2,8 @@
 
 pub mod cycle;
 mod effects;
+mod learning;
+pub mod scale;
 pub mod scribe;
 pub mod snapshot;
 pub mod witness;

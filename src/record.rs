@@ -29,13 +29,13 @@ pub use evaluation::EvaluationRow;
 pub use folder::Folder;
 pub use policy::{Policy, policy_text, read_policy};
 pub use sidecar::{Sidecar, Status, read_sidecar};
-pub use writer::{Manner, Recorder};
+pub use writer::{Columns, Manner, Recorder};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::session::Phase;
-use crate::signal::{End, State};
+use crate::signal::{End, State, Tallied};
 
 /// This program's version, as stored in every JSON file.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -129,6 +129,8 @@ pub struct EpisodeRow {
     pub success: Option<f64>,
     /// The learner's receptive fields at its end.
     pub receptive_fields: Option<u32>,
+    /// What the task counted, in columns of its own.
+    pub tallied: Tallied,
 }
 
 /// A row of `events.csv`: a transition, fault, discard or change of a device.

@@ -1,3 +1,4 @@
 //! What came out: measures of a session's rollouts.
 
+pub mod achieved;
 pub mod metrics;

@@ -51,12 +51,28 @@ pub fn mix(share: f64, human: f64, machine: f64) -> f64 {
     }
 }
 
+/// What stays as it is once a region is handed over (3.1.5: "freezing the learning for
+/// regions that attain high level autonomy").
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Freeze {
+    /// Nothing: control flows back whenever success falls.
+    #[default]
+    Off,
+    /// The share: the region stays the robot's.
+    Share,
+    /// The share, and what the robot has learned: samples from the region teach no more.
+    ShareAndLearner,
+}
+
 /// The parameters of sharing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// The success window α, in control steps spent in the region.
     pub window_steps: u32,
+    /// α in episodes; where it is set, shares move once an episode, by its mean measure.
+    pub window_episodes: Option<u32>,
     /// What stands for the samples that a window does not have yet.
     pub window_fill: Fill,
     /// w stays 1 until success first reaches this (3.2.2); 0 for no gate.
@@ -65,44 +81,81 @@ pub struct Params {
     pub tau_steps: Option<f64>,
     /// A time constant found by eq. 23 is at least this, in steps.
     pub tau_floor_steps: f64,
+    /// The time constant of w in episodes, where shares move once an episode; `None`: from
+    /// the gate.
+    pub tau_episodes: Option<f64>,
+    /// One found from the gate is at least this, in episodes.
+    pub tau_floor_episodes: f64,
+    /// What stays as it is once a region is handed over,
+    pub freeze: Freeze,
+    /// which it is when its share is below this and its window is full.
+    pub freeze_share: f64,
 }
 
 impl Default for Params {
     fn default() -> Self {
         Self {
             window_steps: 4000,
+            window_episodes: None,
             window_fill: Fill::Minimum,
             gate: 0.4,
             tau_steps: None,
             tau_floor_steps: 1.0,
+            tau_episodes: None,
+            tau_floor_episodes: 1.0,
+            freeze: Freeze::Off,
+            freeze_share: 0.05,
         }
     }
 }
 
 impl Check for Params {
     fn check(&self, c: &mut Checker<'_>) {
+        const TAU: std::ops::RangeInclusive<f64> = 1.0..=1e9;
         c.count("window_steps", self.window_steps, 1..=10_000_000);
         c.range("gate", self.gate, 0.0..=0.99);
-        match self.tau_steps {
-            Some(tau) => c.range("tau_steps", tau, 1.0..=1e9),
+        let (key, tau) = if let Some(episodes) = self.window_episodes {
+            c.count("window_episodes", episodes, 1..=10_000_000);
+            c.demand(
+                self.tau_steps.is_none(),
+                "tau_steps",
+                format_args!("{:?}", self.tau_steps),
+                "None where window_episodes is set: tau_episodes counts there",
+            );
+            ("tau_episodes", self.tau_episodes)
+        } else {
+            c.demand(
+                self.tau_episodes.is_none(),
+                "tau_episodes",
+                format_args!("{:?}", self.tau_episodes),
+                "None where window_episodes is None: tau_steps counts there",
+            );
+            ("tau_steps", self.tau_steps)
+        };
+        match tau {
+            Some(tau) => c.range(key, tau, TAU),
             None => c.demand(
                 self.gate > 0.0,
                 "gate",
                 self.gate,
-                "above 0 when tau_steps is None, since τ is then found from the gate (eq. 23)",
+                &format!("above 0 when {key} is None, since τ is then found from the gate (eq. 23)"),
             ),
         }
-        c.range("tau_floor_steps", self.tau_floor_steps, 1.0..=1e9);
+        c.range("tau_floor_steps", self.tau_floor_steps, TAU);
+        c.range("tau_floor_episodes", self.tau_floor_episodes, TAU);
+        c.range("freeze_share", self.freeze_share, 0.0..=0.99);
     }
 }
 
-/// What one step's measure did to its region.
+/// What one measure did to its region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observed {
-    /// The region's success with this step's measure in its window.
+    /// The region's success with this measure in its window.
     pub success: f64,
-    /// Whether the gate opened at this very step.
+    /// Whether the gate opened at it.
     pub gate_opened: bool,
+    /// Whether the region was handed over for good at it.
+    pub froze: bool,
 }
 
 /// The shares of all regions and all that moves them; the whole of it is stored in a
@@ -124,10 +177,11 @@ impl Sharing {
     /// Full control to the person in every one of `regions`, with empty windows.
     #[must_use]
     pub fn new(params: &Params, mode: Mode, regions: &[Region]) -> Self {
+        let length = params.window_episodes.unwrap_or(params.window_steps);
         let regions = regions
             .iter()
             .map(|region| RegionShare {
-                window: Window::new(params.window_steps, params.window_fill, region.scale),
+                window: Window::new(length, params.window_fill, region.scale),
                 weight: Weight::default(),
             })
             .collect();
@@ -149,20 +203,29 @@ impl Sharing {
         self.regions.get(region).map_or(0.0, |r| r.window.success())
     }
 
-    /// Takes the measure of a controlled step spent in `region`: its window, then its
-    /// share, move on.
+    /// Takes the measure of a controlled step spent in `region`, or of an episode: its
+    /// window, then its share, move on.
     pub fn observe(&mut self, region: usize, measure: f64) -> Observed {
         let Some(here) = self.regions.get_mut(region) else {
-            return Observed { success: 0.0, gate_opened: false };
+            return Observed { success: 0.0, gate_opened: false, froze: false };
         };
         here.window.push(measure);
         let success = here.window.success();
         let gate_opened = here.weight.step(success, &self.dynamics);
-        Observed { success, gate_opened }
+        let froze = here.window.is_full() && here.weight.freeze(&self.dynamics);
+        Observed { success, gate_opened, froze }
     }
 
-    /// The step at which `region`'s gate opened and the time constant found there, in
-    /// steps of that region.
+    /// Whether what happens in `region` teaches the robot no more.
+    #[must_use]
+    pub fn is_learner_frozen(&self, region: usize) -> bool {
+        self.mode == Mode::Simultaneous
+            && self.dynamics.freezes_learner()
+            && self.regions.get(region).is_some_and(|r| r.weight.is_frozen())
+    }
+
+    /// The step, or episode, at which `region`'s gate opened and the time constant found
+    /// there, in steps of that region, or in episodes.
     #[must_use]
     pub fn gate(&self, region: usize) -> Option<weight::Opened> {
         self.regions.get(region).and_then(|r| r.weight.opened())
@@ -210,7 +273,7 @@ mod tests {
         }
         let opened = s.gate(0).unwrap();
         assert_eq!(opened.step, 54);
-        assert!((opened.tau_steps - tau.unwrap()).abs() < 1e-12);
+        assert!((opened.tau - tau.unwrap()).abs() < 1e-12);
         assert!(s.share(0) < 0.3);
     }
 

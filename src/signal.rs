@@ -45,6 +45,9 @@ pub struct Row<const CAPACITY: usize> {
 }
 
 impl<const CAPACITY: usize> Row<CAPACITY> {
+    /// The most numbers that a row holds.
+    pub const CAPACITY: usize = CAPACITY;
+
     /// The row of the given numbers; numbers beyond the capacity do not compile.
     #[must_use]
     pub const fn new<const N: usize>(numbers: [f64; N]) -> Self {
@@ -120,6 +123,9 @@ pub type State = Row<4>;
 
 /// What the learner sees of a state, in the order of the task's feature names.
 pub type Features = Row<6>;
+
+/// What a task counted in one rollout, in the order of its tally's names.
+pub type Tallied = Row<4>;
 
 /// A plant's input in the plant's own unit (N for the cart-pole).
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd, Serialize, Deserialize)]

@@ -93,6 +93,8 @@ impl Backend for Rest {
         let [x, _, theta, theta_dot] = start[..] else { panic!("{start:?}") };
         self.state = State::new([x, self.speed, theta, theta_dot]);
     }
+
+    fn go_on(&mut self, _place: Place) {}
 }
 
 /// Pushes to the right, and more so in a repeated rollout.
@@ -161,7 +163,7 @@ fn profile(phases: &str) -> Profile {
             rules: (cap_s: 0.12),
             session: (
                 phases: [{phases}],
-                introduction_rollouts: 3,
+                introduction_rollouts: Some(3),
                 main_rollouts: None,
                 main_duration_s: Some(1.0),
                 hold_s: 0.0,

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use coadapt::profile::{Document, Origin, Profile, ProfileError, WantedMode, list, show};
+use coadapt::profile::{Document, Experiment, Origin, Profile, ProfileError, WantedMode, list, show};
 use proptest::prelude::*;
 
 const BALANCE: &str = include_str!("../profiles/balance.ron");
@@ -40,25 +40,55 @@ fn key_lines(text: &str) -> Vec<(String, String, String)> {
                 path.push(key);
                 continue;
             }
-            let above = lines[index - 1].trim().strip_prefix("//").unwrap_or("");
-            let (value, comment) = rest.split_once("//").unwrap_or((rest, above));
+            let words = |line: &&str| line.trim().strip_prefix("//").map(|c| c.trim().to_owned());
+            let above: Vec<String> =
+                lines[..index].iter().rev().map_while(words).collect::<Vec<_>>();
+            let above = above.into_iter().rev().collect::<Vec<_>>().join(" ");
+            // A comment goes on in the lines below, as far as they hold nothing else.
+            let below = lines[index + 1..].iter().map_while(words).collect::<Vec<_>>().join(" ");
+            let (value, comment) = match rest.split_once("//") {
+                Some((value, comment)) => (value, format!("{} {below}", comment.trim())),
+                None => (rest, above),
+            };
             let value = value.trim().trim_end_matches(',');
             let key = path.iter().chain([&key]).copied().collect::<Vec<_>>().join(".");
-            keys.push((key, value.to_owned(), comment.to_owned()));
+            keys.push((key, value.to_owned(), comment));
         }
     }
     keys
 }
 
-#[test]
-fn the_shipped_profile_is_the_defaults() {
-    assert_eq!(read(BALANCE), read("(task: \"balance\")"));
+/// The text of a task's plain profile.
+fn plain(task: &str) -> String {
+    std::fs::read_to_string(format!("profiles/{task}.ron")).unwrap()
 }
 
 #[test]
-fn the_shipped_profile_holds_every_key_with_meaning_default_and_range() {
-    let keys = key_lines(BALANCE);
-    let shown = key_lines(&read(BALANCE).to_ron());
+fn the_plain_profiles_are_their_tasks_defaults() {
+    for task in Experiment::NAMES {
+        assert_eq!(read(&plain(task)), read(&format!("(task: {task:?})")), "{task}");
+    }
+}
+
+#[test]
+fn a_task_has_its_own_defaults_for_what_a_profile_leaves_out() {
+    let short = read("(task: \"swing-up\", plant: (bounce: 0.1), sharing: (gate: 0.2))");
+    let mut document = Document::find("swing-up", &nowhere()).unwrap();
+    document.set("plant.bounce", "0.1");
+    document.set("sharing.gate", "0.2");
+    assert_eq!(short, document.read().unwrap());
+}
+
+#[test]
+fn the_plain_profiles_hold_every_key_with_meaning_default_and_range() {
+    for task in Experiment::NAMES {
+        holds_every_key(task);
+    }
+}
+
+fn holds_every_key(task: &str) {
+    let keys = key_lines(&plain(task));
+    let shown = key_lines(&read(&plain(task)).to_ron());
     assert!(shown.len() > 40);
     for (key, _, _) in &shown {
         assert!(keys.iter().any(|(known, _, _)| known == key), "{key} is missing");
@@ -70,7 +100,7 @@ fn the_shipped_profile_holds_every_key_with_meaning_default_and_range() {
         }
         // The range in the comment is the one that is checked.
         for beyond in ["1e300", "4294967295"] {
-            let mut document = balance();
+            let mut document = Document::find(task, &nowhere()).unwrap();
             document.set(&key, beyond);
             let Err(report) = document.read() else { continue };
             for fault in report.faults() {

@@ -16,7 +16,7 @@ use coadapt::record::{
 use coadapt::record::{policy, read_policy, read_sidecar};
 use coadapt::session::{Phase, Subject, Trial};
 use coadapt::sharing::Mode;
-use coadapt::signal::{End, State};
+use coadapt::signal::{End, State, Tallied};
 use proptest::prelude::*;
 use samples::*;
 
@@ -68,7 +68,8 @@ fn a_session_leaves_the_files_with_the_promised_columns() {
         assert_eq!(
             read(&path, "episodes.csv"),
             "phase,episode,start,steps,duration_s,end,return,\
-            mean_reward,share,success,receptive_fields\nmain,1,0.05,3,0.06,failed,1.5,0.5,1.0,,7\n"
+            mean_reward,share,success,receptive_fields,mean_speed,end_hits\n\
+            main,1,0.05,3,0.06,failed,1.5,0.5,1.0,,7,0.30000000000000004,3.0\n"
         );
         assert_eq!(
             read(&path, "events.csv"),
@@ -397,6 +398,7 @@ fn an_evaluation_reads_back_and_a_repeated_one_replaces_it() {
         end: End::Cap,
         total: 987.0,
         mean_reward: 0.987,
+        tallied: Tallied::new([0.25, 3.0]),
     };
     recorder.evaluation(vec![row.clone()]);
     recorder.evaluation(vec![row.clone(), row.clone()]);

@@ -9,7 +9,7 @@ use coadapt::session::machine::{Finish, Stage};
 use coadapt::session::plan::{Instructions, Params, Plan};
 use coadapt::session::{Moment, Phase};
 use coadapt::sharing::weight::Opened;
-use coadapt::signal::{End, Intent, Seconds, State, Tick};
+use coadapt::signal::{End, Intent, Seconds, State, Tallied, Tick};
 use coadapt::tui::live::{self, History, Info, SceneInfo, Ui, View};
 use coadapt::tui::palette::{Glyphs, Look, Palette};
 use coadapt::tui::results;
@@ -69,7 +69,7 @@ fn running(phase: Phase) -> Snapshot {
     snapshot.applied = -4.5;
     snapshot.shares[0] = 0.63;
     snapshot.successes[0] = 0.71;
-    snapshot.gate = Some(Opened { step: 2_413, tau_steps: 2_633.4 });
+    snapshot.gate = Some(Opened { step: 2_413, tau: 2_633.4 });
     snapshot.fields = 64;
     snapshot.learned = 7_214;
     snapshot.lateness = Seconds(0.0001);
@@ -110,6 +110,7 @@ fn row(phase: Phase, episode: u32) -> EpisodeRow {
         share,
         success,
         receptive_fields: Some(50),
+        tallied: Tallied::default(),
     }
 }
 
@@ -410,7 +411,7 @@ proptest! {
         snapshot.successes = [success; 8];
         snapshot.lateness = Seconds(late);
         snapshot.speed = speed;
-        snapshot.gate = Some(Opened { step: u64::MAX, tau_steps: tau });
+        snapshot.gate = Some(Opened { step: u64::MAX, tau });
         snapshot.region = region;
         snapshot.learned = u64::MAX;
         let glyphs = [Glyphs::Braille, Glyphs::Half, Glyphs::Ascii][usize::from(glyphs)];

@@ -103,6 +103,10 @@ impl Backend for Safe {
     fn prepare(&mut self, start: State, place: Place) {
         self.inner.prepare(start, place);
     }
+
+    fn go_on(&mut self, place: Place) {
+        self.inner.go_on(place);
+    }
 }
 
 impl Drop for Safe {
@@ -141,6 +145,7 @@ mod tests {
         fn prepare(&mut self, start: State, _place: Place) {
             self.state = start;
         }
+        fn go_on(&mut self, _place: Place) {}
     }
 
     #[test]

@@ -34,6 +34,10 @@ impl Backend for Simulated {
 
     fn prepare(&mut self, start: State, place: Place) {
         self.state = start;
+        self.go_on(place);
+    }
+
+    fn go_on(&mut self, place: Place) {
         self.plant.reseed(stream(self.seed, Purpose::Friction, place));
     }
 }

@@ -6,7 +6,7 @@
 use hdrhistogram::Histogram;
 
 use super::snapshot::{Command, MOST_REGIONS, Publisher, Snapshot};
-use super::witness::{Happening, Standing, Witness};
+use super::witness::{Standing, Witness};
 use crate::backend::safety::Safe;
 use crate::backend::{Backend, Sensed};
 use crate::clock::{Clock, Pacer, Wake};
@@ -16,11 +16,10 @@ use crate::record::{EpisodeRow, StepRow};
 use crate::session::machine::{self, Event, Finish, Stage};
 use crate::session::plan::Plan;
 use crate::session::{Moment, Phase};
-use crate::sharing::weight::Opened;
 use crate::sharing::{self, Mode, Sharing, mix};
 use crate::signal::{Action, End, Intent, Seconds, State, Tick};
-use crate::task::Task;
-use crate::teaching;
+use crate::task::{Nothing, Occasion, Tally, Task};
+use crate::teaching::{self, Sight, Teacher};
 
 /// Who and what takes part.
 pub struct Crew<W> {
@@ -92,12 +91,33 @@ pub(super) struct Mind {
 }
 
 /// The rollout under way.
-#[derive(Clone, Copy, Default)]
 pub(super) struct Rollout {
     pub(super) start: f64,
     pub(super) total_reward: f64,
+    pub(super) total_measure: f64,
+    pub(super) tally: Box<dyn Tally>,
     /// Samples that the learner refused, and why.
     pub(super) refused: Option<(u64, Refusal)>,
+}
+
+impl Default for Rollout {
+    fn default() -> Self {
+        Self {
+            start: 0.0,
+            total_reward: 0.0,
+            total_measure: 0.0,
+            tally: Box::new(Nothing),
+            refused: None,
+        }
+    }
+}
+
+/// Where a rollout goes on that does not begin at the task's start.
+#[derive(Clone, Copy)]
+pub(super) struct WentOn {
+    pub(super) phase: Phase,
+    pub(super) rollout: u32,
+    pub(super) state: State,
 }
 
 /// A session under way.
@@ -108,7 +128,12 @@ pub struct Cycle<W> {
     pub(super) mind: Mind,
     pub(super) before_rollout: Option<Mind>,
     pub(super) rollout: Rollout,
+    pub(super) went_on: Option<WentOn>,
+    pub(super) teacher: Teacher,
+    /// Rollouts that the operator has steered,
     pub(super) practice: u32,
+    /// and their control steps.
+    pub(super) practice_steps: u64,
     pub(super) episodes: Vec<EpisodeRow>,
     pub(super) cause: Option<String>,
     interrupted: bool,
@@ -133,6 +158,8 @@ impl<W: Witness> Cycle<W> {
         let mind = Mind { learner, sharing, learned: 0, refused: 0, tenths: 0 };
         let moment = from.as_ref().map(|(standing, _)| standing.moment);
         let (stage, effects) = machine::begin(&rules.plan, moment);
+        let names: Vec<&str> = crew.task.regions().iter().map(|region| region.name).collect();
+        let teacher = Teacher::new(&rules.teaching, rules.tick, &names);
         let mut cycle = Self {
             rules,
             crew,
@@ -140,7 +167,10 @@ impl<W: Witness> Cycle<W> {
             mind,
             before_rollout: None,
             rollout: Rollout::default(),
+            went_on: None,
+            teacher,
             practice: 0,
+            practice_steps: 0,
             episodes: Vec::new(),
             cause: None,
             interrupted: false,
@@ -171,6 +201,9 @@ impl<W: Witness> Cycle<W> {
         self.mind.learned = standing.learned;
         self.mind.refused = standing.refused;
         self.practice = standing.practice;
+        self.practice_steps = standing.practice_steps;
+        let Moment { phase, rollout, .. } = standing.moment;
+        self.went_on = standing.state.map(|state| WentOn { phase, rollout, state });
         self.mind.tenths = standing.tenths;
     }
 
@@ -246,25 +279,28 @@ impl<W: Witness> Cycle<W> {
         let applied = self.crew.backend.actuate(Action(wanted)).0;
         // The time-critical half ends here.
 
-        let task = &*self.crew.task;
-        let reward = task.reward(&state);
+        let Sensed { state: next, .. } = self.crew.backend.sense();
+        let reward = self.crew.task.reward(&state, &next);
+        let end = self.crew.task.end(&next, moment.step + 1, occasion(moment.phase));
         let mut success = None;
         if moment.phase == Phase::Main {
-            let observed = self.mind.sharing.observe(region, task.measure(&state));
-            success = Some(observed.success);
-            self.teach(&features, human, applied);
-            if observed.gate_opened {
-                self.note_gate(moment, region);
-            }
+            success = Some(self.observe(moment, region, self.crew.task.measure(&state, reward)));
+            self.teach(Sight {
+                features,
+                region,
+                cost: self.crew.task.cost(&state),
+                human,
+                applied,
+                teaches: !self.mind.sharing.is_learner_frozen(region),
+            });
         }
-        let Sensed { state: next, .. } = self.crew.backend.sense();
-        let end = self.crew.task.end(&next, moment.step + 1);
         if moment.phase.is_steered() {
             let told =
                 Feedback { state: &state, applied: Action(applied), reward, next: &next, end };
             self.crew.operator.told(&told);
         }
         self.rollout.total_reward += reward;
+        self.rollout.tally.step(&state, &next);
         let row = StepRow {
             phase: moment.phase,
             episode: moment.rollout,
@@ -330,31 +366,6 @@ impl<W: Witness> Cycle<W> {
             Phase::Main => Some(self.mind.sharing.share(region)),
             Phase::Autonomous => Some(0.0),
             Phase::ZeroControl => None,
-        }
-    }
-
-    fn teach(&mut self, features: &crate::signal::Features, human: Intent, applied: f64) {
-        let lesson = teaching::lesson(&self.rules.teaching, *features, human, applied);
-        if let Some(lesson) = lesson {
-            match self.mind.learner.update(&lesson.x, &[lesson.y], lesson.weight) {
-                Ok(()) => self.mind.learned += 1,
-                Err(why) => {
-                    self.mind.refused += 1;
-                    let so_far = self.rollout.refused.map_or(0, |(count, _)| count);
-                    self.rollout.refused = Some((so_far + 1, why));
-                }
-            }
-        }
-    }
-
-    fn note_gate(&mut self, moment: Moment, region: usize) {
-        if let Some(Opened { step, tau_steps }) = self.mind.sharing.gate(region) {
-            self.crew.witness.happening(Happening {
-                event: "gate_opened",
-                moment: Some(moment),
-                phase: None,
-                cause: format!("success reached the gate at step {step}; tau {tau_steps} steps"),
-            });
         }
     }
 
@@ -458,6 +469,11 @@ impl<W: Witness> Cycle<W> {
             witness: self.crew.witness,
         }
     }
+}
+
+/// What the rollouts of `phase` are for.
+pub(super) const fn occasion(phase: Phase) -> Occasion {
+    if phase.is_steered() { Occasion::Taught } else { Occasion::Tested }
 }
 
 fn micros(lateness: Seconds) -> u32 {

@@ -1,6 +1,7 @@
 //! What the cycle does about a transition of the session.
 
-use super::cycle::{Cycle, Mind, Rollout};
+use super::cycle::{Cycle, Mind, Rollout, WentOn, occasion};
+use super::scale;
 use super::witness::{Happening, Standing, Witness};
 use crate::backend::Backend;
 use crate::learner::Learner;
@@ -9,7 +10,7 @@ use crate::session::machine::{self, Effect, Event, Stage};
 use crate::session::plan::Start;
 use crate::session::{Moment, Phase};
 use crate::sharing::Sharing;
-use crate::signal::End;
+use crate::signal::{End, State};
 
 impl<W: Witness> Cycle<W> {
     /// Lets `event` happen to the session, and carries out what follows.
@@ -46,6 +47,7 @@ impl<W: Witness> Cycle<W> {
             match *effect {
                 Effect::Enter(phase) => self.enter(phase),
                 Effect::Prepare(moment) => self.prepare(moment),
+                Effect::GoOn(moment) => self.go_on(moment),
                 // Halts are done already, before everything else.
                 Effect::Halt | Effect::Release(_) => {}
                 Effect::Close { moment, end } => self.close(moment, end),
@@ -65,17 +67,21 @@ impl<W: Witness> Cycle<W> {
 
     fn enter(&mut self, phase: Phase) {
         if phase == Phase::Main {
+            let (regions, practised) = scale::regions(&*self.crew.task, &self.episodes);
             self.mind = Mind {
                 learner: self.rules.fresh.clone(),
-                sharing: Sharing::new(
-                    &self.rules.sharing,
-                    self.rules.mode,
-                    self.crew.task.regions(),
-                ),
+                sharing: Sharing::new(&self.rules.sharing, self.rules.mode, &regions),
                 learned: 0,
                 refused: 0,
                 tenths: 0,
             };
+            if let (Some(mean), Some(region)) = (practised, regions.first()) {
+                let threshold = region.scale.threshold;
+                let cause = format!(
+                    "full success is a mean reward of {threshold}: introduction's was {mean}"
+                );
+                self.note("threshold", None, Some(phase), cause);
+            }
         }
         self.note("phase", None, Some(phase), String::new());
     }
@@ -86,15 +92,43 @@ impl<W: Witness> Cycle<W> {
         }
     }
 
+    /// Puts the plant to where the rollout begins: the task's start, or where a rollout
+    /// that goes on began.
     fn prepare(&mut self, moment: Moment) {
         let task = &*self.crew.task;
-        let start = match self.rules.plan.start(&moment) {
-            Start::Random(mut chance) => task.random_start(&mut chance),
-            Start::Grid { index, count } => task.grid_start(index, count),
+        let went_on = self
+            .went_on
+            .filter(|from| (from.phase, from.rollout) == (moment.phase, moment.rollout));
+        let start = match (went_on, self.rules.plan.start(&moment)) {
+            (Some(from), _) => from.state,
+            (None, Start::Random(mut chance)) => {
+                task.random_start(occasion(moment.phase), &mut chance)
+            }
+            (None, Start::Grid { index, count }) => task.grid_start(index, count),
         };
-        self.rollout = Rollout { start: task.start_value(&start), ..Rollout::default() };
         self.crew.backend.prepare(start, moment.place());
+        self.open(moment, start);
+    }
+
+    /// A rollout begins where the one before ended, without a halt.
+    fn go_on(&mut self, moment: Moment) {
+        let state = self.crew.backend.sense().state;
+        let Moment { phase, rollout, .. } = moment;
+        self.went_on = Some(WentOn { phase, rollout, state });
+        self.crew.backend.go_on(moment.place());
+        self.open(moment, state);
+    }
+
+    /// Everyone begins anew with the rollout that starts at `start`.
+    fn open(&mut self, moment: Moment, start: State) {
+        let task = &*self.crew.task;
+        self.rollout = Rollout {
+            start: task.start_value(&start),
+            tally: task.tally(),
+            ..Rollout::default()
+        };
         self.seen.state = start;
+        self.teacher.begin();
         self.before_rollout = None;
         if moment.phase.is_steered() {
             self.crew.operator.begin(moment.place(), self.practice);
@@ -104,9 +138,13 @@ impl<W: Witness> Cycle<W> {
         }
     }
 
-    /// A rollout is over: its ending state, its row, its policies.
+    /// A rollout is over: its last lessons, its ending state, its row, its policies.
     fn close(&mut self, moment: Moment, end: End) {
         let state = self.crew.backend.sense().state;
+        let is_kept = !matches!(end, End::Discarded | End::Aborted);
+        if moment.phase == Phase::Main && is_kept {
+            self.conclude_rollout(moment, end, state);
+        }
         let t = f64::from(moment.step) * self.rules.tick.0;
         self.crew.witness.step(&StepRow::ending(
             moment.phase,
@@ -126,11 +164,12 @@ impl<W: Witness> Cycle<W> {
             publisher.rollout(row);
         }
         self.episodes.push(row);
-        if matches!(end, End::Discarded | End::Aborted) {
+        if !is_kept {
             return;
         }
         if moment.phase.is_steered() {
             self.practice += 1;
+            self.practice_steps += u64::from(moment.step);
         }
         self.store_tenths(moment, moment.rollout);
     }
@@ -168,6 +207,7 @@ impl<W: Witness> Cycle<W> {
             },
             success: is_main.then(|| self.mind.sharing.success(region)),
             receptive_fields: (is_main || moment.phase == Phase::Autonomous).then_some(fields),
+            tallied: self.rollout.tally.tallied(),
         }
     }
 
@@ -204,6 +244,11 @@ impl<W: Witness> Cycle<W> {
             learned: self.mind.learned,
             refused: self.mind.refused,
             practice: self.practice,
+            practice_steps: self.practice_steps,
+            state: self
+                .went_on
+                .filter(|from| (from.phase, from.rollout) == (moment.phase, moment.rollout))
+                .map(|from| from.state),
             tenths: self.mind.tenths,
         });
     }

@@ -104,7 +104,7 @@ impl Witness for Scribe {
 
     fn standing(&mut self, standing: Standing) {
         self.renew_sidecar();
-        let Standing { moment, learner, sharing, learned, refused, practice, tenths } = standing;
+        let Standing { moment, learner, sharing, learned, refused, .. } = standing;
         self.recorder.checkpoint(Box::new(Checkpoint {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             moment,
@@ -113,8 +113,10 @@ impl Witness for Scribe {
             sharing: Some(sharing),
             learned,
             refused,
-            practice,
-            tenths,
+            practice: standing.practice,
+            practice_steps: standing.practice_steps,
+            state: standing.state,
+            tenths: standing.tenths,
             steps_bytes: 0,
             episodes_bytes: 0,
         }));
@@ -166,6 +168,8 @@ pub fn standing_of(checkpoint: Checkpoint<Model>, frozen: Option<Model>) -> Opti
         learned: checkpoint.learned,
         refused: checkpoint.refused,
         practice: checkpoint.practice,
+        practice_steps: checkpoint.practice_steps,
+        state: checkpoint.state,
         tenths: checkpoint.tenths,
     })
 }

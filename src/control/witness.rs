@@ -4,6 +4,7 @@ use crate::learner::Model;
 use crate::record::{EpisodeRow, StepRow};
 use crate::session::{Moment, Phase};
 use crate::sharing::Sharing;
+use crate::signal::State;
 
 /// Everything that must be known to go on after a cut, at the start of a rollout.
 #[derive(Clone, Debug)]
@@ -18,8 +19,12 @@ pub struct Standing {
     pub learned: u64,
     /// and refused.
     pub refused: u64,
-    /// Rollouts that the operator has steered.
+    /// Rollouts that the operator has steered,
     pub practice: u32,
+    /// and their control steps.
+    pub practice_steps: u64,
+    /// Where the rollout goes on, if it does not begin at the task's start.
+    pub state: Option<State>,
     /// Tenths of main whose policies are stored.
     pub tenths: u8,
 }

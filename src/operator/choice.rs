@@ -16,8 +16,6 @@ use crate::check::{Check, Checker};
 pub struct Params {
     /// Hands on the keyboard.
     pub keyboard: terminal::Params,
-    /// Simulated operators.
-    pub simulated: simulated::Params,
     /// Factor on a device's deflection.
     pub sensitivity: f64,
 }
@@ -26,7 +24,6 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             keyboard: terminal::Params::default(),
-            simulated: simulated::Params::default(),
             sensitivity: 1.0,
         }
     }
@@ -35,7 +32,6 @@ impl Default for Params {
 impl Check for Params {
     fn check(&self, c: &mut Checker<'_>) {
         self.keyboard.check(&mut c.section("keyboard"));
-        self.simulated.check(&mut c.section("simulated"));
         c.range("sensitivity", self.sensitivity, 0.05..=20.0);
     }
 }

@@ -7,11 +7,17 @@ use serde::{Serialize, Serializer};
 use super::layout::{Layout, Profile};
 use super::ron_options;
 use crate::check::{Check, Checker};
+use crate::operator::simulated;
 use crate::plant::Plant;
+use crate::plant::ball_beam::{self, BallBeam};
 use crate::plant::cart_pole::{self, CartPole};
+use crate::plant::mountain_car as hill;
 use crate::signal::Seconds;
 use crate::task::Task;
 use crate::task::balance::{self, Balance};
+use crate::task::mountain_car::{self, MountainCar};
+use crate::task::speed_up::{self, SpeedUp};
+use crate::task::swing_up::{self, SwingUp};
 
 /// A task with the parameters of its plant and its rules.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +29,35 @@ pub enum Experiment {
         plant: cart_pole::Params,
         /// Release, failure and cap.
         rules: balance::Params,
+        /// Who steers where nobody is there.
+        simulated: simulated::Params,
+    },
+    /// Swing the pole up and keep it there.
+    SwingUp {
+        /// The cart-pole.
+        plant: cart_pole::Params,
+        /// Times and regions.
+        rules: swing_up::Params,
+        /// Who steers where nobody is there.
+        simulated: simulated::Params,
+    },
+    /// Roll the ball as fast as possible.
+    SpeedUp {
+        /// The ball and beam.
+        plant: ball_beam::Params,
+        /// Times, limits and scale.
+        rules: speed_up::Params,
+        /// Who steers where nobody is there.
+        simulated: simulated::Params,
+    },
+    /// Drive up to the flag.
+    MountainCar {
+        /// The car on its hill.
+        plant: hill::Params,
+        /// Start, rewards and scale.
+        rules: mountain_car::Params,
+        /// Who steers where nobody is there.
+        simulated: simulated::Params,
     },
 }
 
@@ -31,12 +66,24 @@ pub(super) type Reader = fn(&str) -> SpannedResult<Profile>;
 
 impl Experiment {
     /// The names of all tasks.
-    pub const NAMES: [&'static str; 1] = [Balance::NAME];
+    pub const NAMES: [&'static str; 4] =
+        [Balance::NAME, SwingUp::NAME, SpeedUp::NAME, MountainCar::NAME];
 
     /// How a profile of `task` is read; `None` when there is no such task.
     pub(super) fn reader(task: &str) -> Option<Reader> {
         match task {
-            Balance::NAME => Some(|text| read(text, |plant, rules| Self::Balance { plant, rules })),
+            Balance::NAME => Some(|text| {
+                read(text, |plant, rules, simulated| Self::Balance { plant, rules, simulated })
+            }),
+            SwingUp::NAME => Some(|text| {
+                read(text, |plant, rules, simulated| Self::SwingUp { plant, rules, simulated })
+            }),
+            SpeedUp::NAME => Some(|text| {
+                read(text, |plant, rules, simulated| Self::SpeedUp { plant, rules, simulated })
+            }),
+            MountainCar::NAME => Some(|text| {
+                read(text, |plant, rules, simulated| Self::MountainCar { plant, rules, simulated })
+            }),
             _ => None,
         }
     }
@@ -46,6 +93,9 @@ impl Experiment {
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Balance { .. } => Balance::NAME,
+            Self::SwingUp { .. } => SwingUp::NAME,
+            Self::SpeedUp { .. } => SpeedUp::NAME,
+            Self::MountainCar { .. } => MountainCar::NAME,
         }
     }
 
@@ -53,7 +103,19 @@ impl Experiment {
     #[must_use]
     pub const fn columns(&self) -> &'static [&'static str] {
         match self {
-            Self::Balance { .. } => &CartPole::COLUMNS,
+            Self::Balance { .. } | Self::SwingUp { .. } => &CartPole::COLUMNS,
+            Self::SpeedUp { .. } => &BallBeam::COLUMNS,
+            Self::MountainCar { .. } => &hill::MountainCar::COLUMNS,
+        }
+    }
+
+    /// The unit of the action, one or two characters.
+    #[must_use]
+    pub const fn action_unit(&self) -> &'static str {
+        match self {
+            Self::Balance { .. } | Self::SwingUp { .. } => "N",
+            Self::SpeedUp { .. } => "V",
+            Self::MountainCar { .. } => "",
         }
     }
 
@@ -61,7 +123,10 @@ impl Experiment {
     #[must_use]
     pub fn task(&self, tick: Seconds) -> Box<dyn Task> {
         match self {
-            Self::Balance { plant, rules } => Box::new(Balance::new(rules, plant, tick)),
+            Self::Balance { plant, rules, .. } => Box::new(Balance::new(rules, plant, tick)),
+            Self::SwingUp { plant, rules, .. } => Box::new(SwingUp::new(rules, plant, tick)),
+            Self::SpeedUp { plant, rules, .. } => Box::new(SpeedUp::new(rules, plant, tick)),
+            Self::MountainCar { plant, rules, .. } => Box::new(MountainCar::new(rules, plant)),
         }
     }
 
@@ -69,7 +134,11 @@ impl Experiment {
     #[must_use]
     pub fn plant(&self, tick: Seconds) -> Box<dyn Plant> {
         match self {
-            Self::Balance { plant, .. } => Box::new(CartPole::new(plant.clone(), tick)),
+            Self::Balance { plant, .. } | Self::SwingUp { plant, .. } => {
+                Box::new(CartPole::new(plant.clone(), tick))
+            }
+            Self::SpeedUp { plant, .. } => Box::new(BallBeam::new(plant.clone(), tick)),
+            Self::MountainCar { plant, .. } => Box::new(hill::MountainCar::new(plant.clone())),
         }
     }
 
@@ -80,29 +149,49 @@ impl Experiment {
         serializer: S,
     ) -> Result<S::Ok, S::Error> {
         match self {
-            Self::Balance { plant, rules } => profile.layout(plant, rules).serialize(serializer),
+            Self::Balance { plant, rules, simulated } => {
+                profile.layout(plant, rules, simulated).serialize(serializer)
+            }
+            Self::SwingUp { plant, rules, simulated } => {
+                profile.layout(plant, rules, simulated).serialize(serializer)
+            }
+            Self::SpeedUp { plant, rules, simulated } => {
+                profile.layout(plant, rules, simulated).serialize(serializer)
+            }
+            Self::MountainCar { plant, rules, simulated } => {
+                profile.layout(plant, rules, simulated).serialize(serializer)
+            }
         }
     }
 
-    fn sections(&self) -> (&dyn Check, &dyn Check) {
-        match self {
-            Self::Balance { plant, rules } => (plant, rules),
-        }
+    /// The task's own sections, with their names.
+    fn sections(&self) -> [(&'static str, &dyn Check); 3] {
+        let (plant, rules, simulated): (&dyn Check, &dyn Check, &dyn Check) = match self {
+            Self::Balance { plant, rules, simulated } => (plant, rules, simulated),
+            Self::SwingUp { plant, rules, simulated } => (plant, rules, simulated),
+            Self::SpeedUp { plant, rules, simulated } => (plant, rules, simulated),
+            Self::MountainCar { plant, rules, simulated } => (plant, rules, simulated),
+        };
+        [("plant", plant), ("rules", rules), ("simulated", simulated)]
     }
 }
 
 impl Check for Experiment {
     fn check(&self, c: &mut Checker<'_>) {
-        let (plant, rules) = self.sections();
-        plant.check(&mut c.section("plant"));
-        rules.check(&mut c.section("rules"));
+        for (name, section) in self.sections() {
+            section.check(&mut c.section(name));
+        }
     }
 }
 
-fn read<P, R>(text: &str, experiment: impl FnOnce(P, R) -> Experiment) -> SpannedResult<Profile>
+fn read<P, R, S>(
+    text: &str,
+    experiment: impl FnOnce(P, R, S) -> Experiment,
+) -> SpannedResult<Profile>
 where
     P: DeserializeOwned + Default,
     R: DeserializeOwned + Default,
+    S: DeserializeOwned + Default,
 {
-    Ok(ron_options().from_str::<Layout<P, R>>(text)?.profile(experiment))
+    Ok(ron_options().from_str::<Layout<P, R, S>>(text)?.profile(experiment))
 }

@@ -13,16 +13,17 @@ use crate::{learner, operator, session, sharing, teaching};
 /// program uses it.
 macro_rules! sections {
     ($($(#[$about:meta])* $section:ident: $params:ty,)*) => {
-        /// A profile as it stands in a file, for a task with plant parameters `P` and rules
-        /// `R`.
+        /// A profile as it stands in a file, for a task with plant parameters `P`, rules `R`
+        /// and simulated operators `S`.
         #[derive(Clone, Debug, Serialize, Deserialize)]
         #[serde(
             rename = "Profile",
             deny_unknown_fields,
             default,
-            bound(deserialize = "P: DeserializeOwned + Default, R: DeserializeOwned + Default")
+            bound(deserialize = "P: DeserializeOwned + Default, R: DeserializeOwned + Default, \
+                S: DeserializeOwned + Default")
         )]
-        pub(super) struct Layout<P, R> {
+        pub(super) struct Layout<P, R, S> {
             task: String,
             preset: String,
             mode: WantedMode,
@@ -30,9 +31,10 @@ macro_rules! sections {
             plant: P,
             rules: R,
             $($section: $params,)*
+            simulated: S,
         }
 
-        impl<P: Default, R: Default> Default for Layout<P, R> {
+        impl<P: Default, R: Default, S: Default> Default for Layout<P, R, S> {
             fn default() -> Self {
                 Self {
                     task: String::new(),
@@ -42,15 +44,20 @@ macro_rules! sections {
                     plant: P::default(),
                     rules: R::default(),
                     $($section: <$params>::default(),)*
+                    simulated: S::default(),
                 }
             }
         }
 
-        impl<P, R> Layout<P, R> {
-            /// The profile of this layout, its plant and rules told apart by `experiment`.
-            pub(super) fn profile(self, experiment: impl FnOnce(P, R) -> Experiment) -> Profile {
+        impl<P, R, S> Layout<P, R, S> {
+            /// The profile of this layout, whose plant, rules and simulated operators make
+            /// an `experiment`.
+            pub(super) fn profile(
+                self,
+                experiment: impl FnOnce(P, R, S) -> Experiment,
+            ) -> Profile {
                 Profile {
-                    experiment: experiment(self.plant, self.rules),
+                    experiment: experiment(self.plant, self.rules, self.simulated),
                     preset: self.preset,
                     mode: self.mode,
                     tick_ms: self.tick_ms,
@@ -63,7 +70,8 @@ macro_rules! sections {
         /// aside.
         #[derive(Clone, Debug, PartialEq)]
         pub struct Profile {
-            /// The task with its plant and rules: the keys `task`, `plant` and `rules`.
+            /// The task with its plant, rules and simulated operators: the keys `task`, `plant`,
+            /// `rules` and `simulated`.
             pub experiment: Experiment,
             /// Whose settings these are: `thesis` for the published experiments.
             pub preset: String,
@@ -75,8 +83,8 @@ macro_rules! sections {
         }
 
         impl Profile {
-            /// The layout of this profile for its task's plant and rules.
-            pub(super) fn layout<P, R>(&self, plant: P, rules: R) -> Layout<P, R> {
+            /// The layout of this profile for its task's own sections.
+            pub(super) fn layout<P, R, S>(&self, plant: P, rules: R, simulated: S) -> Layout<P, R, S> {
                 Layout {
                     task: self.experiment.name().to_owned(),
                     preset: self.preset.clone(),
@@ -85,6 +93,7 @@ macro_rules! sections {
                     plant,
                     rules,
                     $($section: self.$section.clone(),)*
+                    simulated,
                 }
             }
         }
@@ -99,6 +108,16 @@ macro_rules! sections {
                 );
                 c.range("tick_ms", self.tick_ms, 1.0..=1000.0);
                 self.experiment.check(c);
+                let task = self.experiment.task(self.tick());
+                let regions: Vec<&str> = task.regions().iter().map(|r| r.name).collect();
+                for name in &self.teaching.delay_regions {
+                    c.demand(
+                        regions.contains(&name.as_str()),
+                        "teaching.delay_regions",
+                        format_args!("{name:?}"),
+                        &format!("regions of this task: {}", regions.join(", ")),
+                    );
+                }
                 $(self.$section.check(&mut c.section(stringify!($section)));)*
             }
         }
@@ -114,7 +133,7 @@ sections! {
     sharing: sharing::Params,
     /// Phases, rollouts and instructions.
     session: session::plan::Params,
-    /// Hands and simulated people.
+    /// Hands on a device.
     operator: operator::Params,
     /// What is drawn, and how often.
     screen: Screen,

@@ -7,7 +7,12 @@ use std::path::{Path, PathBuf};
 use super::reading::nearest;
 
 /// The profiles built into the program.
-const BUILT_IN: [(&str, &str); 1] = [("balance", include_str!("../../profiles/balance.ron"))];
+const BUILT_IN: [(&str, &str); 4] = [
+    ("balance", include_str!("../../profiles/balance.ron")),
+    ("mountain-car", include_str!("../../profiles/mountain-car.ron")),
+    ("speed-up", include_str!("../../profiles/speed-up.ron")),
+    ("swing-up", include_str!("../../profiles/swing-up.ron")),
+];
 
 /// No profile is longer than this, bytes.
 const LONGEST: u64 = 1 << 20;

@@ -12,6 +12,7 @@ use super::document::{Document, Set};
 use super::edit;
 use super::experiment::{Experiment, Reader};
 use super::layout::Profile;
+use super::library;
 use super::report::{Fault, MOST_SHOWN, Place, Report, clip};
 use super::ron_options;
 use super::scan::{self, Entry, line_of};
@@ -23,23 +24,49 @@ pub(super) struct Keys {
     /// Each key with its default.
     leaves: Vec<(String, String)>,
     sections: Vec<String>,
+    /// The keys whose default is the task's own, not that of the rooms: what its plain
+    /// profile says.
+    own: Vec<String>,
 }
 
 impl Keys {
     /// The keys of `task`, if there is such a task.
     pub fn of(task: &str) -> Option<Self> {
         let reader = Experiment::reader(task)?;
-        let defaults = reader("()").map(|profile| profile.to_ron()).unwrap_or_default();
-        let mut keys = Self { reader, leaves: Vec::new(), sections: Vec::new() };
-        for entry in scan::entries(&defaults).unwrap_or_default() {
-            let value = defaults.get(entry.value).unwrap_or_default().to_owned();
+        let text = |profile: &str| reader(profile).map(|profile| profile.to_ron());
+        let bare = text("()").unwrap_or_default();
+        let plain = library::built_in(task).and_then(|source| text(source).ok());
+        let defaults = plain.unwrap_or_else(|| bare.clone());
+        let outline = |text: &str| scan::entries(text).unwrap_or_default();
+        let bare_values: HashMap<String, &str> = outline(&bare)
+            .into_iter()
+            .filter_map(|entry| Some((entry.path, bare.get(entry.value)?)))
+            .collect();
+        let mut keys =
+            Self { reader, leaves: Vec::new(), sections: Vec::new(), own: Vec::new() };
+        for entry in outline(&defaults) {
+            let value = defaults.get(entry.value).unwrap_or_default();
             if entry.is_section {
                 keys.sections.push(entry.path);
-            } else {
-                keys.leaves.push((entry.path, value));
+                continue;
             }
+            if bare_values.get(&entry.path) != Some(&value) {
+                keys.own.push(entry.path.clone());
+            }
+            keys.leaves.push((entry.path, value.to_owned()));
         }
         Some(keys)
+    }
+
+    /// `text` with the task's own defaults for the keys that it leaves out.
+    fn complete(&self, mut text: String) -> String {
+        let given = scan::entries(&text).unwrap_or_default();
+        let is_given = |key: &str| given.iter().any(|entry| entry.path == key);
+        for key in self.own.iter().filter(|key| !is_given(key)) {
+            let value = self.default(key).unwrap_or_default();
+            text = edit::put(&text, key, value).unwrap_or(text);
+        }
+        text
     }
 
     /// The paths of all keys that hold a value.
@@ -206,7 +233,7 @@ pub(super) fn read(document: &Document) -> Result<Profile, Report> {
             Err(fault) => faults.push(*fault),
         }
     }
-    match (keys.reader)(&text) {
+    match (keys.reader)(&keys.complete(text)) {
         Ok(profile) => {
             faults.extend(faults_of_ranges(&profile, document, &entries));
             faults.sort_by_key(|fault| fault.place.order());

@@ -10,10 +10,11 @@ use super::document::{self, Document};
 use super::folder::Folder;
 use super::names::{CHECKPOINT, CHECKPOINT_KIND, EPISODES, EVENTS, SESSION, STEPS};
 use super::sidecar::{Resumption, Sidecar, Status};
-use super::writer::{Manner, Recorder};
+use super::writer::{Columns, Manner, Recorder};
 use super::{EpisodeRow, Error, EventRow, Storable, reader, table};
 use crate::session::Moment;
 use crate::sharing::Sharing;
+use crate::signal::State;
 
 /// All that a session needs to go on with the rollout at `moment`. The random streams
 /// follow from the seed and the moment.
@@ -35,6 +36,12 @@ pub struct Checkpoint<M> {
     pub refused: u64,
     /// Rollouts that the operator steered so far.
     pub practice: u32,
+    /// Their control steps.
+    #[serde(default)]
+    pub practice_steps: u64,
+    /// Where the next rollout goes on, if it does not begin at the task's start.
+    #[serde(default)]
+    pub state: Option<State>,
     /// Tenths of main whose policies are written.
     pub tenths: u8,
     /// The length of `steps.csv` that belongs to this checkpoint; the writer fills it in.
@@ -94,7 +101,9 @@ impl Folder {
         let mut episodes = Tail::open(self.file(EPISODES), checkpoint.episodes_bytes)?;
         let kept = reader::Episodes::open_until(&self.file(EPISODES), checkpoint.episodes_bytes)?
             .collect::<Result<Vec<_>, _>>()?;
-        let columns = reader::Steps::open(&self.file(STEPS))?.columns().to_vec();
+        let state = reader::Steps::open(&self.file(STEPS))?.columns().to_vec();
+        let tally = reader::Episodes::open(&self.file(EPISODES))?.tally().to_vec();
+        let columns = Columns { state: &state, tally: &tally };
 
         let dropped_steps = steps.cut()?;
         let dropped_episodes = episodes.cut()?;

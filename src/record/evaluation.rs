@@ -4,8 +4,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Error, document};
-use crate::signal::End;
+use super::names::EVALUATION_COLUMNS;
+use super::{EpisodeRow, Error, document};
+use crate::signal::{End, Tallied};
 
 /// A row of `evaluation.csv`: one autonomous rollout of one policy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,16 +28,35 @@ pub struct EvaluationRow {
     pub total: f64,
     /// The mean of rewards.
     pub mean_reward: f64,
+    /// What the task counted, in columns of its own.
+    pub tallied: Tallied,
 }
 
-/// Writes all rows as one file that is there whole or not at all. A resumed session that
+impl EvaluationRow {
+    /// The row of `rollout`, done by `policy`.
+    #[must_use]
+    pub fn of(policy: String, rollout: &EpisodeRow) -> Self {
+        let EpisodeRow { episode, start, steps, duration_s, end, total, .. } = *rollout;
+        let EpisodeRow { mean_reward, tallied, .. } = *rollout;
+        Self { policy, episode, start, steps, duration_s, end, total, mean_reward, tallied }
+    }
+}
+
+/// Writes all rows, with the `tally`'s names, as one file that is there whole or not at all. A resumed session that
 /// evaluates once more replaces its own.
 ///
 /// # Errors
 /// When the disk refuses.
-pub fn write_evaluation(path: &Path, rows: &[EvaluationRow], durable: bool) -> Result<(), Error> {
-    let mut table = csv::Writer::from_writer(Vec::new());
+pub fn write_evaluation(
+    path: &Path,
+    tally: &[&str],
+    rows: &[EvaluationRow],
+    durable: bool,
+) -> Result<(), Error> {
+    let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
     let unfit = |fault: &dyn std::fmt::Display| Error::unfit(path, format!("not written: {fault}"));
+    let header = EVALUATION_COLUMNS.iter().chain(tally);
+    table.write_record(header).map_err(|fault| unfit(&fault))?;
     for row in rows {
         table.serialize(row).map_err(|fault| unfit(&fault))?;
     }

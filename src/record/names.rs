@@ -10,7 +10,7 @@ pub(super) const EVALUATION: &str = "evaluation.csv";
 /// The word for checkpoints in their files.
 pub(super) const CHECKPOINT_KIND: &str = "checkpoint";
 
-/// The columns of `episodes.csv`.
+/// The columns of `episodes.csv`, before those of what the task counted.
 pub(super) const EPISODE_COLUMNS: [&str; 11] = [
     "phase",
     "episode",
@@ -24,6 +24,10 @@ pub(super) const EPISODE_COLUMNS: [&str; 11] = [
     "success",
     "receptive_fields",
 ];
+
+/// The columns of `evaluation.csv`, before those of what the task counted.
+pub(super) const EVALUATION_COLUMNS: [&str; 8] =
+    ["policy", "episode", "start", "steps", "duration_s", "end", "return", "mean_reward"];
 
 /// The columns of `events.csv`.
 pub(super) const EVENT_COLUMNS: [&str; 6] = ["time", "phase", "episode", "step", "event", "cause"];

@@ -9,9 +9,9 @@ use serde::Deserialize;
 use serde::de::IntoDeserializer;
 use serde::de::value::Error as WordError;
 
-use super::names::{EPISODE_COLUMNS, EVENT_COLUMNS, STEP_COLUMNS};
+use super::names::{EPISODE_COLUMNS, EVALUATION_COLUMNS, EVENT_COLUMNS, STEP_COLUMNS};
 use super::{EpisodeRow, Error, EvaluationRow, EventRow, StepRow, table};
-use crate::signal::State;
+use crate::signal::{State, Tallied};
 
 /// The rows of `steps.csv`, one at a time.
 pub struct Steps {
@@ -81,6 +81,7 @@ impl Iterator for Steps {
 /// The rows of `episodes.csv`, one at a time.
 pub struct Episodes {
     lines: Lines,
+    tally: Vec<String>,
 }
 
 impl Episodes {
@@ -96,7 +97,14 @@ impl Episodes {
     pub(super) fn open_until(path: &Path, length: u64) -> Result<Self, Error> {
         let lines = Lines::open(path, length)?;
         lines.demand(&EPISODE_COLUMNS)?;
-        Ok(Self { lines })
+        let tally = lines.header.iter().skip(EPISODE_COLUMNS.len()).map(str::to_owned).collect();
+        Ok(Self { lines, tally })
+    }
+
+    /// The names of what the task counted.
+    #[must_use]
+    pub fn tally(&self) -> &[String] {
+        &self.tally
     }
 
     fn row(&self) -> Result<EpisodeRow, Error> {
@@ -113,6 +121,7 @@ impl Episodes {
             share: cells.optional()?,
             success: cells.optional()?,
             receptive_fields: cells.optional()?,
+            tallied: cells.tallied(self.tally.len())?,
         })
     }
 }
@@ -154,16 +163,8 @@ pub fn read_events(path: &Path) -> Result<Vec<EventRow<String>>, Error> {
 /// When it cannot be read, is another kind of table, or a cell is wrong.
 pub fn read_evaluation(path: &Path) -> Result<Vec<EvaluationRow>, Error> {
     let mut lines = Lines::open(path, u64::MAX)?;
-    lines.demand(&[
-        "policy",
-        "episode",
-        "start",
-        "steps",
-        "duration_s",
-        "end",
-        "return",
-        "mean_reward",
-    ])?;
+    lines.demand(&EVALUATION_COLUMNS)?;
+    let counted = lines.header.len().saturating_sub(EVALUATION_COLUMNS.len());
     let mut rows = Vec::new();
     while let Some(read) = lines.advance() {
         read?;
@@ -177,6 +178,7 @@ pub fn read_evaluation(path: &Path) -> Result<Vec<EvaluationRow>, Error> {
             end: cells.word()?,
             total: cells.value()?,
             mean_reward: cells.value()?,
+            tallied: cells.tallied(counted)?,
         });
     }
     Ok(rows)
@@ -291,6 +293,15 @@ impl<'a> Cells<'a> {
         let cell = self.next()?;
         let word: Result<T, WordError> = T::deserialize(cell.into_deserializer());
         word.map_err(|fault| self.wrong(fault.to_string()))
+    }
+
+    /// The `count` numbers that a task counted; beyond what is kept, later columns.
+    fn tallied(&mut self, count: usize) -> Result<Tallied, Error> {
+        let mut numbers = Vec::with_capacity(count);
+        for _ in 0..count.min(Tallied::CAPACITY) {
+            numbers.push(self.value()?);
+        }
+        Ok(Tallied::from_slice(&numbers).unwrap_or_default())
     }
 
     fn optional_word<T: Deserialize<'a>>(&mut self) -> Result<Option<T>, Error> {

@@ -48,6 +48,15 @@ enum Message<M> {
     Finish(Box<Sidecar>),
 }
 
+/// The names of the columns that differ from task to task.
+#[derive(Clone, Copy, Debug)]
+pub struct Columns<'a, Name> {
+    /// Those of the state's numbers, in `steps.csv`.
+    pub state: &'a [Name],
+    /// Those of what the task counts in a rollout, in `episodes.csv` and `evaluation.csv`.
+    pub tally: &'a [Name],
+}
+
 /// The handle through which a session is recorded. Dropping it writes what is queued, as
 /// [`finish`](Self::finish) does, but leaves the session's status as it is.
 pub struct Recorder<M> {
@@ -67,22 +76,24 @@ impl<M> fmt::Debug for Recorder<M> {
 
 impl<M: Storable> Recorder<M> {
     /// Writes `session.json` and the tables' headers (where they are missing), then starts
-    /// the writer thread. `columns` are the names of the state's numbers.
+    /// the writer thread.
     ///
     /// # Errors
     /// When the disk refuses, so that no session begins that could not be kept.
     pub fn start<Name: AsRef<str>>(
         folder: Folder,
-        columns: &[Name],
+        columns: &Columns<'_, Name>,
         manner: Manner,
         sidecar: &Sidecar,
     ) -> Result<Self, Error> {
         let (before, after) = STEP_COLUMNS;
-        let state = columns.iter().map(AsRef::as_ref);
+        let state = columns.state.iter().map(AsRef::as_ref);
         let header: Vec<&str> = before.into_iter().chain(state).chain(after).collect();
+        let counted = columns.tally.iter().map(AsRef::as_ref);
+        let episodes: Vec<&str> = EPISODE_COLUMNS.into_iter().chain(counted).collect();
         let tables = Tables {
             steps: Table::open(folder.file(STEPS), &header)?,
-            episodes: Table::open(folder.file(EPISODES), &EPISODE_COLUMNS)?,
+            episodes: Table::open(folder.file(EPISODES), &episodes)?,
             events: Table::open(folder.file(EVENTS), &EVENT_COLUMNS)?,
         };
         document::write(&folder.file(SESSION), sidecar, manner == Manner::Live)?;
@@ -94,8 +105,14 @@ impl<M: Storable> Recorder<M> {
         }
         let (queue, messages) = sync_channel(QUEUE);
         let fault = Arc::new(OnceLock::new());
-        let writer =
-            Writer { folder, tables: Some(tables), manner, fault: Arc::clone(&fault), first: None };
+        let writer = Writer {
+            folder,
+            tally: columns.tally.iter().map(|name| name.as_ref().to_owned()).collect(),
+            tables: Some(tables),
+            manner,
+            fault: Arc::clone(&fault),
+            first: None,
+        };
         let thread = thread::Builder::new()
             .name("coadapt-writer".to_owned())
             .spawn(move || writer.run(&messages))
@@ -226,6 +243,7 @@ impl Tables {
 
 struct Writer {
     folder: Folder,
+    tally: Vec<String>,
     /// `None` once a table could not be written: what is kept stays whole.
     tables: Option<Tables>,
     manner: Manner,
@@ -305,7 +323,8 @@ impl Writer {
                 document::write(&path, &*policy, durable)
             }
             Message::Evaluation(rows) => {
-                write_evaluation(&self.folder.file(EVALUATION), &rows, durable)
+                let tally: Vec<&str> = self.tally.iter().map(String::as_str).collect();
+                write_evaluation(&self.folder.file(EVALUATION), &tally, &rows, durable)
             }
             Message::Sidecar(sidecar) => {
                 document::write(&self.folder.file(SESSION), &*sidecar, durable)

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use super::achieved::Achieved;
 use crate::record::EpisodeRow;
 use crate::session::Phase;
 use crate::sharing::weight::Opened;
@@ -13,18 +14,29 @@ use crate::signal::End;
 const FEW: usize = 10;
 
 /// How main ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct MainEnd {
-    /// The person's share.
-    pub share: f64,
-    /// The success.
-    pub success: f64,
-    /// Where the gate opened.
+    /// The regions, in order.
+    pub regions: Vec<RegionEnd>,
+    /// Where the first region's gate opened.
     pub gate: Option<Opened>,
+    /// Whether shares move once an episode: the gate's numbers count episodes then.
+    pub by_episode: bool,
     /// Samples learned,
     pub learned: u64,
     /// and refused.
     pub refused: u64,
+}
+
+/// How main ended in one region.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RegionEnd {
+    /// The region.
+    pub name: String,
+    /// The person's share there.
+    pub share: f64,
+    /// The success there.
+    pub success: f64,
 }
 
 /// The measures of all phases that took place.
@@ -44,19 +56,16 @@ pub struct Phases {
     pub zero_control: Option<Measures>,
 }
 
-/// The measures of one phase of balance.
+/// The measures of one phase.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Measures {
     /// Rollouts, without discarded and aborted ones.
     pub episodes: usize,
     /// Their controlled steps.
     pub steps: u64,
-    /// The mean time that the pole stayed up, s.
-    pub mean_balance_s: f64,
-    /// Its standard deviation over the rollouts (n − 1), s; none for a single one.
-    pub sd_balance_s: Option<f64>,
-    /// Rollouts that lasted as long as one may.
-    pub full: usize,
+    /// What they came to.
+    #[serde(flatten)]
+    pub achieved: Achieved,
 }
 
 /// The measures of main.
@@ -65,24 +74,54 @@ pub struct MainMeasures {
     /// What every phase has.
     #[serde(flatten)]
     pub common: Measures,
-    /// The mean of the first ten rollouts, s.
-    pub first10_mean_balance_s: f64,
-    /// The mean of the last ten, s.
-    pub last10_mean_balance_s: f64,
-    /// The person's share at the end.
+    /// What balance reports of main beside.
+    #[serde(flatten)]
+    pub progress: Option<Progress>,
+    /// The person's share at the end; of several regions the mean.
     pub final_share: f64,
-    /// The success at the end.
+    /// The success at the end; of several regions the mean.
     pub final_success: f64,
+    /// The regions, where there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub regions: Vec<RegionEnd>,
     /// The learner's fields at the end.
     pub receptive_fields: u32,
     /// Samples learned,
     pub samples: u64,
     /// and refused because they were not finite.
     pub refused: u64,
-    /// The rollout in which the gate opened.
-    pub gate_episode: Option<u32>,
-    /// The time constant of w found there, steps.
-    pub tau_steps: Option<f64>,
+    /// When the gate opened; of a task with several regions nothing.
+    #[serde(flatten)]
+    pub gate: Option<Gate>,
+}
+
+/// How balance went at main's beginning and end.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Progress {
+    /// The mean of the first ten rollouts, s.
+    pub first10_mean_balance_s: f64,
+    /// The mean of the last ten, s.
+    pub last10_mean_balance_s: f64,
+}
+
+/// When the gate opened, and what followed from that.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Gate {
+    /// Shares move each step.
+    Steps {
+        /// The rollout in which it opened.
+        gate_episode: Option<u32>,
+        /// The time constant of w, steps.
+        tau_steps: Option<f64>,
+    },
+    /// Shares move each episode.
+    Episodes {
+        /// The rollout after which it opened.
+        gate_episode: Option<u64>,
+        /// The time constant of w, episodes.
+        tau_episodes: Option<f64>,
+    },
 }
 
 /// Whether a rollout counts: those thrown away or cut off do not.
@@ -96,46 +135,66 @@ pub fn rollouts_of(rows: &[EpisodeRow], phase: Phase) -> impl Iterator<Item = &E
     rows.iter().filter(move |row| row.phase == phase && counts(row))
 }
 
-/// The measures of a session's rollouts; `main` is how main ended, if it took place.
+/// The measures of the rollouts of a session of `task`; `main` is how main ended, if it took
+/// place.
 #[must_use]
-pub fn phases(rows: &[EpisodeRow], main: Option<&MainEnd>) -> Phases {
+pub fn phases(task: &str, rows: &[EpisodeRow], main: Option<&MainEnd>) -> Phases {
     Phases {
-        introduction: measures(rows, Phase::Introduction),
-        main: main.and_then(|end| main_measures(rows, end)),
-        autonomous: measures(rows, Phase::Autonomous),
-        zero_control: measures(rows, Phase::ZeroControl),
+        introduction: measures(task, rows, Phase::Introduction),
+        main: main.and_then(|end| main_measures(task, rows, end)),
+        autonomous: measures(task, rows, Phase::Autonomous),
+        zero_control: measures(task, rows, Phase::ZeroControl),
     }
 }
 
-fn measures(rows: &[EpisodeRow], phase: Phase) -> Option<Measures> {
-    let durations = durations(rows, phase);
-    if durations.is_empty() {
-        return None;
-    }
-    Some(Measures {
-        episodes: durations.len(),
-        steps: rollouts_of(rows, phase).map(|row| u64::from(row.steps)).sum(),
-        mean_balance_s: mean(&durations),
-        sd_balance_s: deviation(&durations),
-        full: rollouts_of(rows, phase).filter(|row| row.end == End::Cap).count(),
+fn measures(task: &str, rows: &[EpisodeRow], phase: Phase) -> Option<Measures> {
+    let rows: Vec<&EpisodeRow> = rollouts_of(rows, phase).collect();
+    (!rows.is_empty()).then(|| Measures {
+        episodes: rows.len(),
+        steps: rows.iter().map(|row| u64::from(row.steps)).sum(),
+        achieved: Achieved::of(task, &rows),
     })
 }
 
-fn main_measures(rows: &[EpisodeRow], end: &MainEnd) -> Option<MainMeasures> {
-    let durations = durations(rows, Phase::Main);
+fn main_measures(task: &str, rows: &[EpisodeRow], end: &MainEnd) -> Option<MainMeasures> {
     let fields = rollouts_of(rows, Phase::Main).last()?.receptive_fields;
+    let common = measures(task, rows, Phase::Main)?;
+    let progress = matches!(common.achieved, Achieved::Balance { .. }).then(|| {
+        let times: Vec<f64> = rollouts_of(rows, Phase::Main).map(|row| row.duration_s).collect();
+        Progress {
+            first10_mean_balance_s: mean(&times[..times.len().min(FEW)]),
+            last10_mean_balance_s: mean(&times[times.len().saturating_sub(FEW)..]),
+        }
+    });
+    let over_regions = |of: fn(&RegionEnd) -> f64| {
+        mean(&end.regions.iter().map(of).collect::<Vec<_>>())
+    };
+    let has_regions = end.regions.len() > 1;
     Some(MainMeasures {
-        common: measures(rows, Phase::Main)?,
-        first10_mean_balance_s: mean(&durations[..durations.len().min(FEW)]),
-        last10_mean_balance_s: mean(&durations[durations.len().saturating_sub(FEW)..]),
-        final_share: end.share,
-        final_success: end.success,
+        common,
+        progress,
+        final_share: over_regions(|region| region.share),
+        final_success: over_regions(|region| region.success),
+        regions: if has_regions { end.regions.clone() } else { Vec::new() },
         receptive_fields: fields.unwrap_or(0),
         samples: end.learned,
         refused: end.refused,
-        gate_episode: end.gate.and_then(|gate| episode_of_step(rows, gate.step)),
-        tau_steps: end.gate.map(|gate| gate.tau_steps),
+        gate: (!has_regions).then(|| gate(rows, end)),
     })
+}
+
+fn gate(rows: &[EpisodeRow], end: &MainEnd) -> Gate {
+    if end.by_episode {
+        Gate::Episodes {
+            gate_episode: end.gate.map(|gate| gate.step),
+            tau_episodes: end.gate.map(|gate| gate.tau),
+        }
+    } else {
+        Gate::Steps {
+            gate_episode: end.gate.and_then(|gate| episode_of_step(rows, gate.step)),
+            tau_steps: end.gate.map(|gate| gate.tau),
+        }
+    }
 }
 
 /// The rollout of main in which controlled step `step`, from 1, took place.
@@ -147,10 +206,6 @@ fn episode_of_step(rows: &[EpisodeRow], step: u64) -> Option<u32> {
             steps >= step
         })
         .map(|row| row.episode)
-}
-
-fn durations(rows: &[EpisodeRow], phase: Phase) -> Vec<f64> {
-    rollouts_of(rows, phase).map(|row| row.duration_s).collect()
 }
 
 /// The arithmetic mean; 0 of nothing.
@@ -181,14 +236,15 @@ impl Phases {
         }
         if let Some(main) = &self.main {
             let mut line = format!("main          {}", main.common.sentence());
-            let _ = write!(
-                line,
-                ", first 10 {:.2} s, last 10 {:.2} s; your share {:.0} %, {} fields",
-                main.first10_mean_balance_s,
-                main.last10_mean_balance_s,
-                100.0 * main.final_share,
-                main.receptive_fields,
-            );
+            if let Some(progress) = &main.progress {
+                let _ = write!(
+                    line,
+                    ", first 10 {:.2} s, last 10 {:.2} s",
+                    progress.first10_mean_balance_s, progress.last10_mean_balance_s
+                );
+            }
+            let share = 100.0 * main.final_share;
+            let _ = write!(line, "; your share {share:.0} %, {} fields", main.receptive_fields);
             lines.push(line);
         }
         if let Some(autonomous) = &self.autonomous {
@@ -205,16 +261,14 @@ impl Measures {
     /// The measures in a sentence.
     #[must_use]
     pub fn sentence(&self) -> String {
-        let spread = self.sd_balance_s.map_or(String::new(), |sd| format!(" ± {sd:.2}"));
-        let plural = if self.episodes == 1 { "" } else { "s" };
-        let Self { mean_balance_s, episodes, .. } = self;
-        format!("{mean_balance_s:.2}{spread} s balanced over {episodes} rollout{plural}")
+        self.achieved.sentence(self.episodes)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::signal::Tallied;
 
     fn row(phase: Phase, episode: u32, steps: u32, end: End) -> EpisodeRow {
         EpisodeRow {
@@ -229,6 +283,7 @@ mod tests {
             share: None,
             success: None,
             receptive_fields: Some(7),
+            tallied: Tallied::default(),
         }
     }
 
@@ -238,23 +293,28 @@ mod tests {
         rows.extend((1..=30).map(|k| row(Phase::Main, k, k * 10, End::Failed)));
         rows.push(row(Phase::Main, 31, 4, End::Aborted));
         let end = MainEnd {
-            share: 0.5,
-            success: 0.6,
-            gate: Some(Opened { step: 61, tau_steps: 66.6 }),
-            learned: 1,
-            refused: 0,
+            regions: vec![RegionEnd { name: "all".to_owned(), share: 0.5, success: 0.6 }],
+            gate: Some(Opened { step: 61, tau: 66.6 }),
+            ..MainEnd::default()
         };
-        let main = phases(&rows, Some(&end)).main.unwrap();
+        let main = phases("balance", &rows, Some(&end)).main.unwrap();
         assert_eq!(main.common.episodes, 30);
-        assert!((main.common.mean_balance_s - 3.1).abs() < 1e-12);
-        assert!((main.first10_mean_balance_s - 1.1).abs() < 1e-12);
-        assert!((main.last10_mean_balance_s - 5.1).abs() < 1e-12);
-        assert_eq!(main.gate_episode, Some(4), "10 + 20 + 30 = 60 steps come before");
-        assert!((main.common.sd_balance_s.unwrap() - 1.7606816861659).abs() < 1e-9);
+        let Achieved::Balance { mean_balance_s, sd_balance_s, full } = main.common.achieved else {
+            unreachable!()
+        };
+        assert!((mean_balance_s - 3.1).abs() < 1e-12);
+        assert!((sd_balance_s.unwrap() - 1.7606816861659).abs() < 1e-9);
+        assert_eq!(full, 0);
+        let progress = main.progress.unwrap();
+        assert!((progress.first10_mean_balance_s - 1.1).abs() < 1e-12);
+        assert!((progress.last10_mean_balance_s - 5.1).abs() < 1e-12);
+        let gate = Gate::Steps { gate_episode: Some(4), tau_steps: Some(66.6) };
+        assert_eq!(main.gate, Some(gate), "10 + 20 + 30 = 60 steps come before");
+        assert_eq!((main.final_share, main.regions), (0.5, Vec::new()));
     }
 
     #[test]
     fn a_phase_that_did_not_take_place_has_no_measures() {
-        assert_eq!(phases(&[], None), Phases::default());
+        assert_eq!(phases("balance", &[], None), Phases::default());
     }
 }

@@ -119,8 +119,12 @@ pub(super) fn steer(
             Box::new(Script::load(file, &phases, limit).map_err(|error| usage(&error))?)
         }
         Choice::Simulated(skill, kind) => {
-            let Experiment::Balance { plant, .. } = &profile.experiment;
-            Box::new(Simulated::new(&params.simulated, *skill, *kind, seed, tick, plant))
+            let (Experiment::Balance { plant, simulated, .. }
+            | Experiment::SwingUp { plant, simulated, .. }) = &profile.experiment
+            else {
+                return Err(RunError::Usage("no simulated operator yet".to_owned()));
+            };
+            Box::new(Simulated::new(simulated, *skill, *kind, seed, tick, plant))
         }
         Choice::Keyboard => match company {
             Company::Attended(Keys { hands, clock }) => {

@@ -14,13 +14,12 @@ use crate::learner::Model;
 use crate::profile::Profile;
 use crate::record::sidecar::{Lateness, Timing};
 use crate::record::{EpisodeRow, EvaluationRow, Sidecar, Status};
-use crate::report::metrics::{self, MainEnd, Phases};
+use crate::report::achieved::Achieved;
+use crate::report::metrics::{self, MainEnd, Phases, RegionEnd};
 use crate::session::Phase;
 use crate::session::machine::Finish;
+use crate::sharing::Sharing;
 use crate::study::evaluate;
-
-/// The region whose share and success stand for the session; balance has one.
-const REGION: usize = 0;
 
 /// A session that is over.
 #[derive(Clone, Debug)]
@@ -33,7 +32,7 @@ pub struct Finished {
     pub folder: PathBuf,
     /// Its rollouts.
     pub episodes: Vec<EpisodeRow>,
-    /// The mean balance time of each tenth's policy, by percent.
+    /// What each tenth's policy achieves alone by the task's yardstick, by percent.
     pub tenths: Vec<(u8, f64)>,
     /// The signal that ended it.
     pub signal: Option<i32>,
@@ -102,21 +101,24 @@ pub(super) fn conclude(
     if status == Status::Complete && !tenths.is_empty() {
         match evaluation(profile, &tenths, sidecar.seed, &episodes, &signal) {
             Some(rows) => {
-                means = tenth_means(&tenths, &rows);
-                recorder.evaluation(rows);
+                means = tenth_means(&sidecar.task, &tenths, &rows);
+                let rows = rows.iter().map(|(percent, row)| {
+                    EvaluationRow::of(format!("policy-{percent:03}"), row)
+                });
+                recorder.evaluation(rows.collect());
             }
             None => status = Status::Interrupted,
         }
     }
     let taught = metrics::rollouts_of(&episodes, Phase::Main).next().is_some();
     let main = taught.then(|| MainEnd {
-        share: sharing.share(REGION),
-        success: sharing.success(REGION),
-        gate: sharing.gate(REGION),
+        regions: regions(profile, &sharing),
+        gate: sharing.gate(0),
+        by_episode: profile.sharing.window_episodes.is_some(),
         learned,
         refused,
     });
-    let phases = metrics::phases(&episodes, main.as_ref());
+    let phases = metrics::phases(&sidecar.task, &episodes, main.as_ref());
     let results = Results {
         schema: 1,
         session: folder.display().to_string(),
@@ -151,6 +153,19 @@ pub(super) fn conclude(
     Ok(Finished { results, cause, folder, episodes, tenths: means, signal: signal() })
 }
 
+/// How main ended in each region of the task.
+fn regions(profile: &Profile, sharing: &Sharing) -> Vec<RegionEnd> {
+    let task = profile.experiment.task(profile.tick());
+    (0..)
+        .zip(task.regions())
+        .map(|(index, region)| RegionEnd {
+            name: region.name.to_owned(),
+            share: sharing.share(index),
+            success: sharing.success(index),
+        })
+        .collect()
+}
+
 /// The autonomous rollouts of each tenth's policy; none when a signal came in between, and
 /// a resumed session evaluates them. The last tenth is the final policy,
 /// whose rollouts the autonomous phase just did, on the same starts and noise.
@@ -160,7 +175,7 @@ fn evaluation(
     seed: u64,
     episodes: &[EpisodeRow],
     signal: &impl Fn() -> Option<i32>,
-) -> Option<Vec<EvaluationRow>> {
+) -> Option<Vec<(u8, EpisodeRow)>> {
     let done: Vec<EpisodeRow> =
         metrics::rollouts_of(episodes, Phase::Autonomous).copied().collect();
     let mut rows = Vec::new();
@@ -170,32 +185,22 @@ fn evaluation(
         } else {
             evaluate::autonomous(profile, learner, seed, || signal().is_some())?
         };
-        rows.extend(rollouts.iter().map(|row| EvaluationRow {
-            policy: policy_name(*percent),
-            episode: row.episode,
-            start: row.start,
-            steps: row.steps,
-            duration_s: row.duration_s,
-            end: row.end,
-            total: row.total,
-            mean_reward: row.mean_reward,
-        }));
+        rows.extend(rollouts.iter().map(|row| (*percent, *row)));
     }
     Some(rows)
 }
 
-fn policy_name(percent: u8) -> String {
-    format!("policy-{percent:03}")
-}
-
-fn tenth_means(tenths: &[(u8, Model)], rows: &[EvaluationRow]) -> Vec<(u8, f64)> {
+fn tenth_means(
+    task: &str,
+    tenths: &[(u8, Model)],
+    rows: &[(u8, EpisodeRow)],
+) -> Vec<(u8, f64)> {
     tenths
         .iter()
         .map(|(percent, _)| {
-            let name = policy_name(*percent);
-            let durations: Vec<f64> =
-                rows.iter().filter(|row| row.policy == name).map(|row| row.duration_s).collect();
-            (*percent, metrics::mean(&durations))
+            let of_it: Vec<&EpisodeRow> =
+                rows.iter().filter(|(of, _)| of == percent).map(|(_, row)| row).collect();
+            (*percent, Achieved::of(task, &of_it).mean())
         })
         .collect()
 }

@@ -251,7 +251,18 @@ fn info(session: &Session) -> Info {
         Mode::Simultaneous => &texts.simultaneous,
         Mode::Sequential => &texts.sequential,
     };
-    let Experiment::Balance { plant, rules } = &profile.experiment;
+    let scene = match &profile.experiment {
+        Experiment::Balance { plant, rules, .. } => SceneInfo::CartPole(Geometry {
+            pole_length_m: plant.pole_length_m,
+            track_length_m: plant.track_length_m,
+            fail_angle_rad: rules.fail_deg.to_radians(),
+        }),
+        _ => SceneInfo::CartPole(Geometry {
+            pole_length_m: 1.0,
+            track_length_m: None,
+            fail_angle_rad: 0.5,
+        }),
+    };
     Info {
         task: sidecar.task.clone(),
         preset: sidecar.preset.clone(),
@@ -272,12 +283,8 @@ fn info(session: &Session) -> Info {
         break_s: profile.session.break_s,
         gate: profile.sharing.gate,
         action_limit: task.action_limit(),
-        action_unit: "N".to_owned(),
-        scene: SceneInfo::CartPole(Geometry {
-            pole_length_m: plant.pole_length_m,
-            track_length_m: plant.track_length_m,
-            fail_angle_rad: rules.fail_deg.to_radians(),
-        }),
+        action_unit: profile.experiment.action_unit().to_owned(),
+        scene,
         field_cap: profile.learner.max_fields,
         operator: sidecar.operator.clone(),
     }

@@ -21,7 +21,7 @@ use crate::operator::{self, Choice, Operator};
 use crate::profile::{Document, Order, Profile};
 use crate::random::draw_seed;
 use crate::record::sidecar::Host;
-use crate::record::{self, EpisodeRow, Folder, Manner, Recorder, Sidecar, Status, policy};
+use crate::record::{self, Columns, EpisodeRow, Folder, Manner, Recorder, Sidecar, Status, policy};
 use crate::session::machine::Stage;
 use crate::session::plan::Plan;
 use crate::session::{Moment, Phase, Trial};
@@ -182,7 +182,10 @@ impl Session {
         let folder = created.folder.path().to_owned();
         let recorder = Recorder::start(
             created.folder,
-            profile.experiment.columns(),
+            &Columns {
+                state: profile.experiment.columns(),
+                tally: profile.experiment.task(profile.tick()).tally_names(),
+            },
             company.manner(),
             &sidecar,
         )

@@ -12,7 +12,7 @@ use crate::cli;
 use crate::learner::{Learner, Model};
 use crate::profile::{self, Document, Profile};
 use crate::record::{self, Policy};
-use crate::report::metrics;
+use crate::report::metrics::{self, Measures};
 use crate::study::{evaluate as evaluation, simulate as simulation};
 
 fn usage(error: impl std::fmt::Display) -> RunError {
@@ -84,11 +84,8 @@ struct Evaluation {
     task: String,
     preset: String,
     seed: u64,
-    episodes: usize,
-    steps: u64,
-    mean_balance_s: f64,
-    sd_balance_s: Option<f64>,
-    full: usize,
+    #[serde(flatten)]
+    measures: Measures,
 }
 
 /// `coadapt evaluate …`
@@ -122,7 +119,7 @@ pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
     }
     let rows =
         evaluation::autonomous(&profile, &policy.learner, words.seed, || false).unwrap_or_default();
-    let Some(measures) = metrics::phases(&rows, None).autonomous else {
+    let Some(measures) = metrics::phases(&policy.task, &rows, None).autonomous else {
         return Err(RunError::Failed("no rollout took place".to_owned()));
     };
     if words.json {
@@ -132,15 +129,11 @@ pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
             task: profile.experiment.name().to_owned(),
             preset: policy.preset,
             seed: words.seed,
-            episodes: measures.episodes,
-            steps: measures.steps,
-            mean_balance_s: measures.mean_balance_s,
-            sd_balance_s: measures.sd_balance_s,
-            full: measures.full,
+            measures,
         };
         say(&serde_json::to_string(&evaluation).map_err(|e| RunError::Failed(e.to_string()))?)?;
     } else {
-        say(&format!("{}, {} of them full", measures.sentence(), measures.full))?;
+        say(&measures.sentence())?;
     }
     Ok(ExitCode::SUCCESS)
 }

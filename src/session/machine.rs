@@ -101,6 +101,8 @@ pub enum Effect {
     /// Put the plant to the rollout's start, tell the operator, remember all that a
     /// discard would restore.
     Prepare(Moment),
+    /// The same, but the plant goes on where it is.
+    GoOn(Moment),
     /// The plant is let go.
     Release(Moment),
     /// The rollout is over.
@@ -225,6 +227,11 @@ fn step(plan: &Plan, moment: Moment, end: Option<End>) -> (Stage, Vec<Effect>) {
             steps_before: steps,
             ..moment
         };
+        if end == End::Cap && !plan.returns && next.phase.is_steered() {
+            // The motor, too, goes on: there is no halt between.
+            let effects = vec![Effect::Close { moment, end }, Effect::GoOn(next)];
+            return (Stage::Running(next), effects);
+        }
         return prepare(plan, next, effects);
     }
     effects.push(Effect::Leave(moment.phase));

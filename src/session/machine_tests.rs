@@ -10,7 +10,7 @@ use crate::signal::Seconds;
 
 fn plan(attended: bool) -> Plan {
     let params = Params {
-        introduction_rollouts: 2,
+        introduction_rollouts: Some(2),
         main_rollouts: Some(2),
         autonomous_rollouts: 1,
         hold_s: 0.06,
@@ -49,6 +49,7 @@ fn effect_words(effects: &[Effect]) -> String {
             Effect::Halt => "halt".to_owned(),
             Effect::Enter(phase) => format!("enter {}", phase.word()),
             Effect::Prepare(m) => format!("prepare {}", m.rollout),
+            Effect::GoOn(m) => format!("go on {}", m.rollout),
             Effect::Release(_) => "release".to_owned(),
             Effect::Close { end, .. } => end.word().to_owned(),
             Effect::Restore => "restore".to_owned(),

@@ -85,8 +85,10 @@ impl Default for Instructions {
 pub struct Params {
     /// Which phases take place.
     pub phases: Vec<Wanted>,
-    /// Rollouts of practice.
-    pub introduction_rollouts: u32,
+    /// Rollouts of practice; `None` when only the duration counts.
+    pub introduction_rollouts: Option<u32>,
+    /// Controlled time of practice, s; `None` when only the rollouts count.
+    pub introduction_duration_s: Option<f64>,
     /// Rollouts of teaching; `None` when only the duration counts.
     pub main_rollouts: Option<u32>,
     /// Controlled time of teaching, s; `None` when only the rollouts count.
@@ -95,6 +97,9 @@ pub struct Params {
     pub autonomous_rollouts: u32,
     /// Where autonomous rollouts start.
     pub starts: Starts,
+    /// Whether each steered rollout begins at the task's start. If not, one that was over
+    /// only because its time was goes on where it ended, without a countdown.
+    pub returns: bool,
     /// The countdown before a steered rollout, s.
     pub hold_s: f64,
     /// The countdown before a rollout that nobody steers, s.
@@ -109,11 +114,13 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             phases: Wanted::ALL.to_vec(),
-            introduction_rollouts: 20,
+            introduction_rollouts: Some(20),
+            introduction_duration_s: None,
             main_rollouts: Some(100),
             main_duration_s: None,
             autonomous_rollouts: 100,
             starts: Starts::Grid,
+            returns: true,
             hold_s: 3.0,
             autonomous_hold_s: 0.5,
             break_s: 60.0,
@@ -137,23 +144,36 @@ impl Check for Params {
             format_args!("{:?}", self.phases),
             "one or more of introduction, main, autonomous, in this order, each once",
         );
-        c.count("introduction_rollouts", self.introduction_rollouts, 1..=MOST_ROLLOUTS);
-        if let Some(rollouts) = self.main_rollouts {
-            c.count("main_rollouts", rollouts, 1..=MOST_ROLLOUTS);
-        }
-        match self.main_duration_s {
-            Some(duration) => c.range("main_duration_s", duration, 1.0..=86_400.0),
-            None => c.demand(
-                self.main_rollouts.is_some(),
-                "main_rollouts",
-                "None",
-                "a number of rollouts, or set main_duration_s: one of the two must end the phase",
-            ),
-        }
+        let practice = (self.introduction_rollouts, self.introduction_duration_s);
+        extent(c, ["introduction_rollouts", "introduction_duration_s"], practice);
+        let main = (self.main_rollouts, self.main_duration_s);
+        extent(c, ["main_rollouts", "main_duration_s"], main);
         c.count("autonomous_rollouts", self.autonomous_rollouts, 1..=MOST_ROLLOUTS);
         c.range("hold_s", self.hold_s, 0.0..=60.0);
         c.range("autonomous_hold_s", self.autonomous_hold_s, 0.0..=60.0);
         c.range("break_s", self.break_s, 0.0..=3600.0);
+    }
+}
+
+/// Checks what ends a phase: rollouts, a duration in s, or whichever comes first.
+fn extent(
+    c: &mut Checker<'_>,
+    [rollouts_key, duration_key]: [&str; 2],
+    (rollouts, duration): (Option<u32>, Option<f64>),
+) {
+    if let Some(rollouts) = rollouts {
+        c.count(rollouts_key, rollouts, 1..=MOST_ROLLOUTS);
+    }
+    match duration {
+        Some(duration) => c.range(duration_key, duration, 1.0..=86_400.0),
+        None => c.demand(
+            rollouts.is_some(),
+            rollouts_key,
+            "None",
+            &format!(
+                "a number of rollouts, or set {duration_key}: one of the two must end the phase"
+            ),
+        ),
     }
 }
 
@@ -198,6 +218,8 @@ pub struct Plan {
     pub attended: bool,
     /// The session's seed.
     pub seed: u64,
+    /// Whether each steered rollout begins at the task's start.
+    pub returns: bool,
     starts: Starts,
 }
 
@@ -217,8 +239,8 @@ impl Plan {
         let phases = params.phases.iter().flat_map(|wanted| match wanted {
             Wanted::Introduction => vec![PhasePlan {
                 phase: Phase::Introduction,
-                rollouts: Some(params.introduction_rollouts),
-                steps: None,
+                rollouts: params.introduction_rollouts,
+                steps: params.introduction_duration_s.map(|s| u64::from(ticks(s))),
             }],
             Wanted::Main => vec![PhasePlan {
                 phase: Phase::Main,
@@ -240,6 +262,7 @@ impl Plan {
             break_ticks: ticks(params.break_s),
             attended,
             seed,
+            returns: params.returns,
             starts: params.starts,
         }
     }

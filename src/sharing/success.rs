@@ -52,6 +52,12 @@ impl Window {
         }
     }
 
+    /// Whether no sample is missing any more.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        self.measures.len() >= self.length as usize
+    }
+
     /// The success now, 0 to 1.
     #[must_use]
     pub fn success(&self) -> f64 {

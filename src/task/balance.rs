@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::Task;
+use super::{Occasion, Task, steps_of};
 use crate::check::{Check, Checker};
 use crate::plant::cart_pole::{self, CartPole};
 use crate::sharing::region::{Region, Scale};
@@ -48,6 +48,7 @@ pub struct Balance {
     release: f64,
     fail: f64,
     cap_steps: u32,
+    omega_squared: f64,
     force_limit: f64,
 }
 
@@ -60,16 +61,12 @@ impl Balance {
     /// The task with ticks of `tick` on the given plant.
     #[must_use]
     pub fn new(params: &Params, plant: &cart_pole::Params, tick: Seconds) -> Self {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "checked: at most an hour of ticks of a millisecond"
-        )]
-        let cap_steps = (params.cap_s / tick.0).round() as u32;
         Self {
             release: params.release_deg.to_radians(),
             fail: params.fail_deg.to_radians(),
-            cap_steps: cap_steps.max(1),
+            cap_steps: steps_of(params.cap_s, tick),
+            // ω² = g / (1.24 l) of a pole on a cart that is not held; l is half the pole.
+            omega_squared: plant.gravity_m_s2 / (1.24 * plant.pole_length_m / 2.0),
             force_limit: plant.force_limit_n,
         }
     }
@@ -103,7 +100,7 @@ impl Task for Balance {
         &CartPole::COLUMNS
     }
 
-    fn random_start(&self, chance: &mut ChaCha8Rng) -> State {
+    fn random_start(&self, _occasion: Occasion, chance: &mut ChaCha8Rng) -> State {
         Self::released_at(if self.release > 0.0 {
             chance.random_range(-self.release..=self.release)
         } else {
@@ -122,11 +119,17 @@ impl Task for Balance {
     }
 
     /// Eq. 18: 1 upright, 0 at θ_max.
-    fn reward(&self, state: &State) -> f64 {
+    fn reward(&self, state: &State, _next: &State) -> f64 {
         (self.fail - angle(state).abs()) / self.fail
     }
 
-    fn end(&self, state: &State, steps: u32) -> Option<End> {
+    /// θ² + (θ̇/ω)²: the squared distance from upright at rest, rad².
+    fn cost(&self, state: &State) -> f64 {
+        let speed = state.get(3).copied().unwrap_or(0.0);
+        angle(state).powi(2) + speed.powi(2) / self.omega_squared.max(1e-9)
+    }
+
+    fn end(&self, state: &State, steps: u32, _occasion: Occasion) -> Option<End> {
         // Written so that an angle that is not a number has failed, too.
         let upright = angle(state).abs() <= self.fail;
         if !upright || !state.is_finite() {
@@ -168,7 +171,10 @@ mod tests {
     #[test]
     fn reward_is_equation_18() {
         let task = balance();
-        let at = |deg: f64| task.reward(&Balance::released_at(deg.to_radians()));
+        let at = |deg: f64| {
+            let state = Balance::released_at(deg.to_radians());
+            task.reward(&state, &state)
+        };
         assert!((at(0.0) - 1.0).abs() < 1e-15);
         assert!((at(-15.0) - 0.5).abs() < 1e-15);
         assert!(at(30.0).abs() < 1e-15);
@@ -177,7 +183,9 @@ mod tests {
     #[test]
     fn rollouts_end_beyond_thirty_degrees_and_at_twenty_seconds() {
         let task = balance();
-        let at = |deg: f64, steps| task.end(&Balance::released_at(deg.to_radians()), steps);
+        let at = |deg: f64, steps| {
+            task.end(&Balance::released_at(deg.to_radians()), steps, Occasion::Taught)
+        };
         assert_eq!(at(29.9, 999), None);
         assert_eq!(at(-30.1, 1), Some(End::Failed));
         assert_eq!(at(0.0, 1000), Some(End::Cap));
@@ -192,7 +200,7 @@ mod tests {
         assert_eq!(deg(0, 1), 0.0);
         let mut chance = stream(1, Purpose::Starts, Place::default());
         let starts: Vec<f64> =
-            (0..1000).map(|_| task.random_start(&mut chance)[2].to_degrees()).collect();
+            (0..1000).map(|_| task.random_start(Occasion::Taught, &mut chance)[2].to_degrees()).collect();
         assert!(starts.iter().all(|a| a.abs() <= 5.0));
         assert!(starts.iter().any(|a| *a < -4.5) && starts.iter().any(|a| *a > 4.5));
     }

@@ -5,14 +5,16 @@ use std::path::Path;
 
 use coadapt::record::sidecar::Host;
 use coadapt::record::{
-    Checkpoint, EpisodeRow, Folder, Manner, Policy, Recorder, Sidecar, Status, StepRow, VERSION,
+    Checkpoint, Columns, EpisodeRow, Folder, Manner, Policy, Recorder, Sidecar, Status, StepRow, VERSION,
 };
 use coadapt::session::{Moment, Phase, Subject, Trial};
 use coadapt::sharing::Mode;
-use coadapt::signal::{End, State};
+use coadapt::signal::{End, State, Tallied};
 use serde::{Deserialize, Serialize};
 
-pub const COLUMNS: [&str; 4] = ["x", "x_dot", "theta", "theta_dot"];
+pub const STATE: [&str; 4] = ["x", "x_dot", "theta", "theta_dot"];
+pub const COLUMNS: Columns<'static, &str> =
+    Columns { state: &STATE, tally: &["mean_speed", "end_hits"] };
 
 /// A learner as the program stores them: an enum with a tag.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -90,6 +92,7 @@ pub fn episode(number: u32) -> EpisodeRow {
         share: Some(1.0),
         success: None,
         receptive_fields: Some(7),
+        tallied: Tallied::new([0.1 + 0.2, 3.0]),
     }
 }
 
@@ -103,6 +106,8 @@ pub fn checkpoint(rollout: u32) -> Box<Checkpoint<Model>> {
         learned: 3,
         refused: 0,
         practice: rollout,
+        practice_steps: 0,
+        state: None,
         tenths: 0,
         steps_bytes: 0,
         episodes_bytes: 0,
@@ -116,7 +121,7 @@ pub fn a_policy(learner: Model) -> Policy<Model> {
         preset: "balance".to_owned(),
         mode: Mode::Sequential,
         percent: 100,
-        features: COLUMNS.map(str::to_owned).to_vec(),
+        features: STATE.map(str::to_owned).to_vec(),
         outputs: vec!["u_human".to_owned()],
         action_limit: Some(10.0),
         learner,

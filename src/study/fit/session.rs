@@ -3,13 +3,15 @@
 use std::path::Path;
 
 use super::{FitError, Kept};
+use crate::control::scale;
 use crate::learner;
 use crate::profile::{Document, Profile};
 use crate::record::{self, EpisodeRow, Sidecar, StepRow, reader};
 use crate::session::Phase;
+use crate::sharing::Sharing;
 use crate::signal::{End, Intent};
 use crate::task::Task;
-use crate::teaching;
+use crate::teaching::{Lesson, Sight, Teacher};
 
 /// The actions that a row holds.
 const ACTIONS: [&str; 4] = ["u_human", "u_machine", "u", "u_applied"];
@@ -57,16 +59,21 @@ pub fn read(
     let profile = Document::from_text("session.json", sidecar.profile_ron.clone()).read()?;
     let mut steps = reader::Steps::open(&folder.join("steps.csv"))?;
     let episodes = reader::Episodes::open(&folder.join("episodes.csv"))?
-        .filter(|row| row.as_ref().map_or(true, |row| row.phase == Phase::Main))
         .collect::<Result<Vec<_>, _>>()?;
     let task = profile.experiment.task(profile.tick());
     let asked = Asked::of(&*task, &profile, steps.columns(), inputs, outputs)?;
-    let mut attempts = Attempts { episodes: &episodes, begun: 0, last: None, rows: 0, lost: 0 };
+    let main: Vec<EpisodeRow> =
+        episodes.iter().filter(|row| row.phase == Phase::Main).copied().collect();
+    let mut attempts = Attempts { episodes: &main, begun: 0, last: None, rows: 0, lost: 0 };
+    let mut replay = Replay::new(&*task, &profile, &sidecar, &episodes);
     let mut samples = Kept::default();
     for (line, row) in (2..).zip(&mut steps) {
         let row = row?;
-        if row.phase == Phase::Main && attempts.keeps(&row)? {
-            asked.take(&*task, &profile, &row, line, &mut samples);
+        let Some(end) = attempts.keeps(&row).transpose()? else { continue };
+        if asked.is_lesson {
+            replay.take(&row, end, |lesson| asked.keep(&lesson, line, &mut samples));
+        } else {
+            asked.take(&*task, &row, line, &mut samples);
         }
     }
     attempts.close();
@@ -110,7 +117,8 @@ enum Place {
 struct Asked {
     inputs: Vec<(String, Place)>,
     outputs: Vec<String>,
-    /// Whether the outputs are the learner's own target.
+    /// Whether the inputs are features and the output is the learner's own target: then the
+    /// samples are the lessons that the session's learner was given.
     is_lesson: bool,
 }
 
@@ -145,38 +153,37 @@ impl Asked {
         if !faults.is_empty() {
             return Err(FitError::Unfit(faults.join("\n")));
         }
-        let inputs = inputs.iter().filter_map(|name| Some((name.clone(), place(name)?)));
-        let is_lesson = outputs == [target];
-        Ok(Self { inputs: inputs.collect(), outputs, is_lesson })
+        let inputs: Vec<(String, Place)> =
+            inputs.iter().filter_map(|name| Some((name.clone(), place(name)?))).collect();
+        let are_features = inputs.iter().all(|(_, place)| matches!(place, Place::Feature(_)));
+        let is_lesson = outputs == [target] && are_features;
+        Ok(Self { inputs, outputs, is_lesson })
+    }
+
+    /// Adds a lesson that was ripe at the row in `line`.
+    fn keep(&self, lesson: &Lesson, line: u64, samples: &mut Kept) {
+        let input = |(_, place): &(String, Place)| match *place {
+            Place::Feature(index) => lesson.x.get(index).copied(),
+            Place::State(_) => None,
+        };
+        let inputs: Option<Vec<f64>> = self.inputs.iter().map(input).collect();
+        if let Some(x) = inputs {
+            samples.push((&x, &[lesson.y], lesson.weight), line);
+        }
     }
 
     /// Adds the sample in `row`, if it holds one.
-    fn take(
-        &self,
-        task: &dyn Task,
-        profile: &Profile,
-        row: &StepRow<String>,
-        line: u64,
-        samples: &mut Kept,
-    ) {
+    fn take(&self, task: &dyn Task, row: &StepRow<String>, line: u64, samples: &mut Kept) {
         let features = task.features(&row.state);
-        let human = row.u_human.map_or(Intent::Absent, Intent::fresh);
-        let applied = row.u_applied.unwrap_or(0.0);
-        let lesson = teaching::lesson(&profile.teaching, features, human, applied);
-        let weight = lesson.map_or(1.0, |lesson| lesson.weight);
-        let seen = lesson.map_or(features, |lesson| lesson.x);
-        let outputs: Option<Vec<f64>> = if self.is_lesson {
-            lesson.map(|lesson| vec![lesson.y])
-        } else {
-            self.outputs.iter().map(|name| action(row, name)).collect()
-        };
         let input = |(_, place): &(String, Place)| match *place {
-            Place::Feature(index) => seen.get(index).copied(),
+            Place::Feature(index) => features.get(index).copied(),
             Place::State(index) => row.state.get(index).copied(),
         };
         let inputs: Option<Vec<f64>> = self.inputs.iter().map(input).collect();
+        let outputs: Option<Vec<f64>> =
+            self.outputs.iter().map(|name| action(row, name)).collect();
         if let (Some(x), Some(y)) = (inputs, outputs) {
-            samples.push((&x, &y, weight), line);
+            samples.push((&x, &y, 1.0), line);
         }
     }
 
@@ -200,6 +207,72 @@ fn action(row: &StepRow<String>, name: &str) -> Option<f64> {
     }
 }
 
+/// Main once more, as far as its lessons go: the teacher, and the shares that may freeze
+/// what is learned.
+struct Replay<'a> {
+    task: &'a dyn Task,
+    teacher: Teacher,
+    sharing: Sharing,
+    by_episode: bool,
+    total_measure: f64,
+}
+
+impl<'a> Replay<'a> {
+    fn new(
+        task: &'a dyn Task,
+        profile: &Profile,
+        sidecar: &Sidecar,
+        episodes: &[EpisodeRow],
+    ) -> Self {
+        let (regions, _) = scale::regions(task, episodes);
+        let names: Vec<&str> = regions.iter().map(|region| region.name).collect();
+        Self {
+            task,
+            teacher: Teacher::new(&profile.teaching, profile.tick(), &names),
+            sharing: Sharing::new(&profile.sharing, sidecar.mode, &regions),
+            by_episode: profile.sharing.window_episodes.is_some(),
+            total_measure: 0.0,
+        }
+    }
+
+    /// Hands out the lessons that were ripe at `row`, as the control tick did. A row without
+    /// an action is the last one of its rollout, which ended with `end`.
+    fn take(&mut self, row: &StepRow<String>, end: End, mut learn: impl FnMut(Lesson)) {
+        let cost = self.task.cost(&row.state);
+        let region = self.task.region(&row.state);
+        if row.step == 0 {
+            self.teacher.begin();
+            self.total_measure = 0.0;
+        }
+        let (Some(applied), Some(reward)) = (row.u_applied, row.reward) else {
+            if end == End::Aborted {
+                return;
+            }
+            while let Some(lesson) = self.teacher.close(end == End::Failed, cost) {
+                learn(lesson);
+            }
+            if self.by_episode && row.step > 0 {
+                self.sharing.observe(region, self.total_measure / f64::from(row.step));
+            }
+            return;
+        };
+        let measure = self.task.measure(&row.state, reward);
+        self.total_measure += measure;
+        if !self.by_episode {
+            self.sharing.observe(region, measure);
+        }
+        let lesson = self.teacher.see(&Sight {
+            features: self.task.features(&row.state),
+            region,
+            cost,
+            human: row.u_human.map_or(Intent::Absent, Intent::fresh),
+            applied,
+            teaches: !self.sharing.is_learner_frozen(region),
+        });
+        lesson.into_iter().for_each(learn);
+    }
+}
+
 /// The rollouts of main as `episodes.csv` lists them, repeated ones each on their own,
 /// beside the rows of `steps.csv`.
 struct Attempts<'a> {
@@ -215,9 +288,13 @@ struct Attempts<'a> {
 }
 
 impl Attempts<'_> {
-    /// Whether the learner kept what it learned from `row`, the next one of main. Rows of a
-    /// rollout that was cut are not in the learner that would go on, nor here.
-    fn keeps(&mut self, row: &StepRow<String>) -> Result<bool, FitError> {
+    /// How the rollout of `row`, the next one of the session, ended, if the learner kept what
+    /// it learned from it. Rows of a rollout that was cut are not in the learner that would
+    /// go on, nor here.
+    fn keeps(&mut self, row: &StepRow<String>) -> Option<Result<End, FitError>> {
+        if row.phase != Phase::Main {
+            return None;
+        }
         let goes_on =
             self.last.is_some_and(|(episode, step)| episode == row.episode && step < row.step);
         if !goes_on {
@@ -228,13 +305,15 @@ impl Attempts<'_> {
         self.last = Some((row.episode, row.step));
         self.rows += u32::from(row.u_applied.is_some());
         match self.episodes.get(self.begun - 1) {
-            None => Ok(false),
-            Some(episode) if episode.episode == row.episode => Ok(episode.end != End::Discarded),
-            Some(episode) => Err(FitError::Unfit(format!(
+            None => None,
+            Some(episode) if episode.episode == row.episode => {
+                (episode.end != End::Discarded).then_some(Ok(episode.end))
+            }
+            Some(episode) => Some(Err(FitError::Unfit(format!(
                 "steps.csv has rows of rollout {} of main where episodes.csv lists rollout {}; \
                  the files do not belong together",
                 row.episode, episode.episode
-            ))),
+            )))),
         }
     }
 

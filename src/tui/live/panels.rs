@@ -76,7 +76,7 @@ fn success(pen: &mut Pen<'_>, view: &View<'_>) {
     }
     let (words, role) = match view.panel.gate {
         Some(opened) => {
-            let tau = fixed(opened.tau_steps, 0, 0);
+            let tau = fixed(opened.tau, 0, 0);
             let words = if is_wide { "gate opened at step" } else { "open" };
             (format!("{words} {}, τ {tau}", opened.step), Role::Robot)
         }

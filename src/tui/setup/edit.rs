@@ -16,6 +16,8 @@ use crate::session::plan::Wanted;
 pub(super) const POLE_LENGTH: &str = "plant.pole_length_m";
 const SENSITIVITY: &str = "operator.sensitivity";
 const PHASES: &str = "session.phases";
+const PRACTICE_ROLLOUTS: &str = "session.introduction_rollouts";
+const PRACTICE_DURATION: &str = "session.introduction_duration_s";
 const MAIN_ROLLOUTS: &str = "session.main_rollouts";
 const MAIN_DURATION: &str = "session.main_duration_s";
 
@@ -73,13 +75,10 @@ impl Drafts {
     /// Shows what `profile` says.
     pub fn show_profile(&mut self, profile: &Profile) {
         let session = &profile.session;
-        self.introduction = Input::new(session.introduction_rollouts.to_string());
+        self.introduction =
+            Input::new(extent(session.introduction_rollouts, session.introduction_duration_s));
         self.autonomous = Input::new(session.autonomous_rollouts.to_string());
-        self.main = Input::new(match (session.main_rollouts, session.main_duration_s) {
-            (Some(rollouts), _) => rollouts.to_string(),
-            (None, Some(duration)) => format!("{duration}s"),
-            (None, None) => String::new(),
-        });
+        self.main = Input::new(extent(session.main_rollouts, session.main_duration_s));
         self.phases = Wanted::ALL.map(|phase| session.phases.contains(&phase));
         self.pole = Input::new(pole_length(profile).map_or(String::new(), length_words));
     }
@@ -89,7 +88,7 @@ impl Drafts {
         for (key, value) in sets.iter().filter(|(_, value)| value != "None") {
             let value = value.clone();
             match key.as_str() {
-                "session.introduction_rollouts" => self.introduction = Input::new(value),
+                PRACTICE_ROLLOUTS => self.introduction = Input::new(value),
                 "session.autonomous_rollouts" => self.autonomous = Input::new(value),
                 MAIN_ROLLOUTS => self.main = Input::new(value),
                 POLE_LENGTH => self.pole = Input::new(value),
@@ -154,8 +153,14 @@ impl Setup {
     pub(super) fn take_text(&mut self, field: Field) {
         let text = self.drafts.value(field).to_owned();
         match field {
-            Field::Introduction => self.change("session.introduction_rollouts", &text),
-            Field::Main => self.change_main(&text),
+            Field::Introduction => {
+                let is_timed = self.base.session.introduction_rollouts.is_none();
+                self.change_extent(&text, [PRACTICE_ROLLOUTS, PRACTICE_DURATION], is_timed);
+            }
+            Field::Main => {
+                let is_timed = self.base.session.main_rollouts.is_none();
+                self.change_extent(&text, [MAIN_ROLLOUTS, MAIN_DURATION], is_timed);
+            }
             Field::Autonomous => self.change("session.autonomous_rollouts", &text),
             Field::Pole => self.change(POLE_LENGTH, &text),
             Field::Subject => {
@@ -171,17 +176,18 @@ impl Setup {
         }
     }
 
-    /// Main ends after a number of rollouts, or, written with an `s`, after a time.
-    fn change_main(&mut self, text: &str) {
-        if let Some(duration) = text.trim().strip_suffix('s') {
-            self.change(MAIN_DURATION, duration.trim());
-            self.change(MAIN_ROLLOUTS, "None");
+    /// A phase ends after a number of rollouts, or, written with an `s`, after a time. Whether
+    /// it `is_timed` before any change.
+    fn change_extent(&mut self, text: &str, [rollouts, duration]: [&str; 2], is_timed: bool) {
+        if let Some(seconds) = text.trim().strip_suffix('s') {
+            self.change(duration, seconds.trim());
+            self.change(rollouts, "None");
         } else {
-            self.change(MAIN_ROLLOUTS, text);
-            if self.base.session.main_rollouts.is_none() {
-                self.change(MAIN_DURATION, "None");
+            self.change(rollouts, text);
+            if is_timed {
+                self.change(duration, "None");
             } else {
-                self.restore(MAIN_DURATION);
+                self.restore(duration);
             }
         }
     }
@@ -376,11 +382,22 @@ pub(super) fn allowed(document: &Document, key: &str) -> String {
     words.unwrap_or_default().to_owned()
 }
 
+/// What ends a phase, as it is typed.
+fn extent(rollouts: Option<u32>, duration_s: Option<f64>) -> String {
+    match (rollouts, duration_s) {
+        (Some(rollouts), _) => rollouts.to_string(),
+        (None, Some(duration)) => format!("{duration}s"),
+        (None, None) => String::new(),
+    }
+}
+
 /// The pole's length, m, where the plant has one.
-#[expect(clippy::unnecessary_wraps, reason = "so far all plants have a pole")]
 pub(super) fn pole_length(profile: &Profile) -> Option<f64> {
     match &profile.experiment {
-        Experiment::Balance { plant, .. } => Some(plant.pole_length_m),
+        Experiment::Balance { plant, .. } | Experiment::SwingUp { plant, .. } => {
+            Some(plant.pole_length_m)
+        }
+        _ => None,
     }
 }
 

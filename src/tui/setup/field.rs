@@ -103,7 +103,9 @@ impl Field {
             "task" => Some(Self::Task),
             "mode" => Some(Self::Mode),
             "learner.kind" => Some(Self::Learner),
-            "session.phases" | "session.introduction_rollouts" => Some(Self::Introduction),
+            "session.phases"
+            | "session.introduction_rollouts"
+            | "session.introduction_duration_s" => Some(Self::Introduction),
             "session.main_rollouts" | "session.main_duration_s" => Some(Self::Main),
             "session.autonomous_rollouts" => Some(Self::Autonomous),
             "operator.sensitivity" => Some(Self::Sensitivity),

@@ -306,7 +306,7 @@ impl View<'_> {
             pen.part(BESIDE + 1, 12, pen.width() - BESIDE - 2, 6)
         };
         match &self.setup.profile.experiment {
-            Experiment::Balance { plant, rules } => {
+            Experiment::Balance { plant, rules, .. } => {
                 let geometry = cart_pole::Geometry {
                     pole_length_m: plant.pole_length_m,
                     track_length_m: plant.track_length_m,
@@ -319,6 +319,7 @@ impl View<'_> {
                 let state = [0.4 * reach * swing, 0.0, 0.4 * lean, 0.0];
                 cart_pole::draw(&mut part, &geometry, &state, scene::Light::Go);
             }
+            _ => {}
         }
     }
 

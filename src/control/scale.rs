@@ -1,0 +1,28 @@
+//! The scale of success where a task measures people by their own practice.
+
+use crate::record::EpisodeRow;
+use crate::session::Phase;
+use crate::sharing::region::Region;
+use crate::signal::End;
+use crate::task::Task;
+
+/// The regions of `task` as main has them after the rollouts `earlier`; and, where the
+/// scale goes by the person's introduction, the mean reward there.
+#[must_use]
+pub fn regions(task: &dyn Task, earlier: &[EpisodeRow]) -> (Vec<Region>, Option<f64>) {
+    let mut regions = task.regions().to_vec();
+    let practice = earlier.iter().filter(|row| {
+        row.phase == Phase::Introduction && !matches!(row.end, End::Discarded | End::Aborted)
+    });
+    let (total, steps) = practice.fold((0.0, 0.0), |(total, steps), row| {
+        (total + row.total, steps + f64::from(row.steps))
+    });
+    let mean = total / steps;
+    match task.own_scale(mean).filter(|_| steps > 0.0) {
+        Some(scale) => {
+            regions.iter_mut().for_each(|region| region.scale = scale);
+            (regions, Some(mean))
+        }
+        None => (regions, None),
+    }
+}
