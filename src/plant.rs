@@ -3,7 +3,9 @@
 //! A plant holds parameters and scratch only; the state is handed in and out, so that it
 //! can be saved, compared and restored.
 
+pub mod ball_beam;
 pub mod cart_pole;
+pub mod mountain_car;
 
 use rand_chacha::ChaCha8Rng;
 
