@@ -5,6 +5,7 @@
 
 use hdrhistogram::Histogram;
 
+use super::effects;
 use super::snapshot::{Command, MOST_REGIONS, Publisher, Snapshot};
 use super::witness::{Happening, Standing, Witness};
 use crate::backend::safety::Safe;
@@ -109,6 +110,8 @@ pub struct Cycle<W> {
     pub(super) before_rollout: Option<Mind>,
     pub(super) rollout: Rollout,
     pub(super) practice: u32,
+    /// Ticks of practice.
+    pub(super) practised_ticks: u64,
     pub(super) episodes: Vec<EpisodeRow>,
     pub(super) cause: Option<String>,
     interrupted: bool,
@@ -141,6 +144,7 @@ impl<W: Witness> Cycle<W> {
             before_rollout: None,
             rollout: Rollout::default(),
             practice: 0,
+            practised_ticks: 0,
             episodes: Vec::new(),
             cause: None,
             interrupted: false,
@@ -180,6 +184,7 @@ impl<W: Witness> Cycle<W> {
                 publisher.rollout(*row);
             }
         }
+        self.practised_ticks = earlier.iter().map(effects::practised_ticks).sum();
         self.episodes = earlier;
     }
 

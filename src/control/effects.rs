@@ -4,6 +4,7 @@ use super::cycle::{Cycle, Mind, Rollout};
 use super::witness::{Happening, Standing, Witness};
 use crate::backend::Backend;
 use crate::learner::Learner;
+use crate::operator::Practice;
 use crate::record::{EpisodeRow, StepRow};
 use crate::session::machine::{self, Effect, Event, Stage};
 use crate::session::plan::Start;
@@ -97,7 +98,8 @@ impl<W: Witness> Cycle<W> {
         self.seen.state = start;
         self.before_rollout = None;
         if moment.phase.is_steered() {
-            self.crew.operator.begin(moment.place(), self.practice);
+            let practice = self.practice();
+            self.crew.operator.begin(moment.place(), practice);
             if self.rules.plan.attended {
                 self.before_rollout = Some(self.mind.clone());
             }
@@ -126,6 +128,7 @@ impl<W: Witness> Cycle<W> {
             publisher.rollout(row);
         }
         self.episodes.push(row);
+        self.practised_ticks += practised_ticks(&row);
         if matches!(end, End::Discarded | End::Aborted) {
             return;
         }
@@ -133,6 +136,13 @@ impl<W: Witness> Cycle<W> {
             self.practice += 1;
         }
         self.store_tenths(moment, moment.rollout);
+    }
+
+    /// What the operator has steered so far.
+    fn practice(&self) -> Practice {
+        #[expect(clippy::cast_precision_loss, reason = "a session is shorter than 2^53 ticks")]
+        let ticks = self.practised_ticks as f64;
+        Practice { rollouts: self.practice, time: self.rules.tick * ticks }
     }
 
     /// Marks a rollout of which step rows were lost.
@@ -267,4 +277,10 @@ const fn format_finish(how: machine::Finish) -> &'static str {
         machine::Finish::Complete => "complete",
         machine::Finish::Aborted => "aborted",
     }
+}
+
+/// The ticks of a rollout that count as practice, as its rollout does.
+pub(super) fn practised_ticks(row: &EpisodeRow) -> u64 {
+    let counts = row.phase.is_steered() && !matches!(row.end, End::Discarded | End::Aborted);
+    if counts { u64::from(row.steps) } else { 0 }
 }
