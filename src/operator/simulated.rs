@@ -16,11 +16,14 @@
 //! | mouse-limited | 1.1, 1.2 | 1.2, 1.3 | 1.6, 1.6 |
 //! | lapses | 1.2, 1.6 | 1.4, 1.8 | 2.7, 2.7 |
 
+pub mod ball_beam;
 pub mod cart_pole;
 mod filters;
 mod growth;
 mod law;
+pub mod mountain_car;
 pub mod person;
+pub mod swing_up;
 
 use std::fmt;
 use std::str::FromStr;

@@ -31,6 +31,11 @@ impl<P: Plant> Foresight<P> {
         Self { plant: imagine(Seconds(step)), steps, step_ticks: step / tick.0 }
     }
 
+    /// Foresight over a whole number of ticks.
+    pub(in crate::operator::simulated) const fn over_ticks(steps: u32, plant: P) -> Self {
+        Self { plant, steps, step_ticks: 1.0 }
+    }
+
     /// The state now, from the state as it was and the actions given since.
     pub(in crate::operator::simulated) fn foresee<const N: usize>(
         &mut self,
