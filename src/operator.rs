@@ -37,11 +37,19 @@ pub struct Feedback<'a> {
     pub end: Option<End>,
 }
 
+/// What an operator has steered before a rollout, in introduction and main together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Practice {
+    /// Rollouts, without the discarded ones.
+    pub rollouts: u32,
+    /// The time in them.
+    pub time: Seconds,
+}
+
 /// Someone or something that wants an action at each tick.
 pub trait Operator: Send {
-    /// A rollout is about to begin. `practice` counts the rollouts steered before it, in
-    /// introduction and main together.
-    fn begin(&mut self, place: Place, practice: u32);
+    /// A rollout is about to begin, after that much practice.
+    fn begin(&mut self, place: Place, practice: Practice);
 
     /// The latest wish; never blocks. Called in the countdown too, where it has no effect.
     fn intent(&mut self, view: View<'_>) -> Intent;
@@ -55,7 +63,7 @@ pub trait Operator: Send {
 pub struct Nobody;
 
 impl Operator for Nobody {
-    fn begin(&mut self, _place: Place, _practice: u32) {}
+    fn begin(&mut self, _place: Place, _practice: Practice) {}
 
     fn intent(&mut self, _view: View<'_>) -> Intent {
         Intent::fresh(0.0)

@@ -96,6 +96,20 @@ fn a_finely_stepped_frictionless_plant_conserves_energy() {
 }
 
 #[test]
+fn a_pole_that_whirls_through_the_full_circle_conserves_energy() {
+    let params = Params { pole_length_m: 0.6, substeps: 1000, ..frictionless() };
+    let mut plant = CartPole::new(params.clone(), TICK);
+    let mut state = State::new([0.0, 0.0, std::f64::consts::PI, 12.0]);
+    let before = energy(&params, &state);
+    for _ in 0..500 {
+        state = plant.step(&state, Action(0.0));
+    }
+    assert!(state[2] > 6.0 * std::f64::consts::PI, "{state:?}");
+    let drift = (energy(&params, &state) - before).abs() / before.abs();
+    assert!(drift < 1e-3, "{drift:e}");
+}
+
+#[test]
 fn friction_takes_energy_away() {
     let params = Params { pole_friction_per_s: 0.2, cart_friction_per_s: 0.5, ..frictionless() };
     let mut plant = CartPole::new(params.clone(), TICK);
@@ -115,6 +129,35 @@ fn the_zero_state_stays() {
         state = plant.step(&state, Action(0.0));
     }
     assert_eq!(state, State::new([0.0; 4]));
+}
+
+#[test]
+fn a_hanging_pole_is_at_rest_and_comes_back_to_it() {
+    let hanging = State::new([0.0, 0.0, std::f64::consts::PI, 0.0]);
+    let params = Params { friction_noise_per_s: 0.0, ..Params::default() };
+    let mut plant = CartPole::new(params, TICK);
+    let mut settle = |mut state: State, ticks: u32| {
+        for _ in 0..ticks {
+            state = plant.step(&state, Action(0.0));
+        }
+        state
+    };
+    let still = settle(hanging, 1000);
+    for (now, before) in still.iter().zip(hanging.iter()) {
+        assert!((now - before).abs() < 1e-12, "{still:?}");
+    }
+    let swung = settle(State::new([0.0, 0.0, 2.6, 0.0]), 5000);
+    assert!((swung[2] - hanging[2]).abs() < 1e-3 && swung[3].abs() < 1e-2, "{swung:?}");
+}
+
+#[test]
+fn an_upright_pole_falls_from_the_slightest_tilt() {
+    let mut plant = CartPole::new(Params::default(), TICK);
+    let mut state = State::new([0.0, 0.0, 1e-4, 0.0]);
+    for _ in 0..200 {
+        state = plant.step(&state, Action(0.0));
+    }
+    assert!(state[2].abs() > 0.5, "{state:?}");
 }
 
 #[test]

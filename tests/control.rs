@@ -11,7 +11,7 @@ use coadapt::control::cycle::{Crew, Cycle, Outcome, Rules};
 use coadapt::control::snapshot::{Command, Watcher, channel};
 use coadapt::control::witness::{Happening, Standing, Witness};
 use coadapt::learner::{Learner, Model};
-use coadapt::operator::{Operator, View};
+use coadapt::operator::{Operator, Practice, View};
 use coadapt::profile::{Document, Profile};
 use coadapt::random::Place;
 use coadapt::record::{EpisodeRow, StepRow};
@@ -101,7 +101,7 @@ impl Backend for Rest {
 struct Pusher(f64);
 
 impl Operator for Pusher {
-    fn begin(&mut self, place: Place, _practice: u32) {
+    fn begin(&mut self, place: Place, _practice: Practice) {
         self.0 = PUSH * f64::from(1 + place.attempt);
     }
 

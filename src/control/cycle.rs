@@ -5,6 +5,7 @@
 
 use hdrhistogram::Histogram;
 
+use super::effects;
 use super::snapshot::{Command, MOST_REGIONS, Publisher, Snapshot};
 use super::witness::{Standing, Witness};
 use crate::backend::safety::Safe;
@@ -133,7 +134,7 @@ pub struct Cycle<W> {
     /// Rollouts that the operator has steered,
     pub(super) practice: u32,
     /// and their control steps.
-    pub(super) practice_steps: u64,
+    pub(super) practised_ticks: u64,
     pub(super) episodes: Vec<EpisodeRow>,
     pub(super) cause: Option<String>,
     interrupted: bool,
@@ -170,7 +171,7 @@ impl<W: Witness> Cycle<W> {
             went_on: None,
             teacher,
             practice: 0,
-            practice_steps: 0,
+            practised_ticks: 0,
             episodes: Vec::new(),
             cause: None,
             interrupted: false,
@@ -201,7 +202,6 @@ impl<W: Witness> Cycle<W> {
         self.mind.learned = standing.learned;
         self.mind.refused = standing.refused;
         self.practice = standing.practice;
-        self.practice_steps = standing.practice_steps;
         let Moment { phase, rollout, .. } = standing.moment;
         self.went_on = standing.state.map(|state| WentOn { phase, rollout, state });
         self.mind.tenths = standing.tenths;
@@ -213,6 +213,7 @@ impl<W: Witness> Cycle<W> {
                 publisher.rollout(*row);
             }
         }
+        self.practised_ticks = earlier.iter().map(effects::practised_ticks).sum();
         self.episodes = earlier;
     }
 

@@ -5,6 +5,7 @@ use super::scale;
 use super::witness::{Happening, Standing, Witness};
 use crate::backend::Backend;
 use crate::learner::Learner;
+use crate::operator::Practice;
 use crate::record::{EpisodeRow, StepRow};
 use crate::session::machine::{self, Effect, Event, Stage};
 use crate::session::plan::Start;
@@ -131,7 +132,8 @@ impl<W: Witness> Cycle<W> {
         self.teacher.begin();
         self.before_rollout = None;
         if moment.phase.is_steered() {
-            self.crew.operator.begin(moment.place(), self.practice);
+            let practice = self.practice();
+            self.crew.operator.begin(moment.place(), practice);
             if self.rules.plan.attended {
                 self.before_rollout = Some(self.mind.clone());
             }
@@ -169,9 +171,16 @@ impl<W: Witness> Cycle<W> {
         }
         if moment.phase.is_steered() {
             self.practice += 1;
-            self.practice_steps += u64::from(moment.step);
+            self.practised_ticks += u64::from(moment.step);
         }
         self.store_tenths(moment, moment.rollout);
+    }
+
+    /// What the operator has steered so far.
+    fn practice(&self) -> Practice {
+        #[expect(clippy::cast_precision_loss, reason = "a session is shorter than 2^53 ticks")]
+        let ticks = self.practised_ticks as f64;
+        Practice { rollouts: self.practice, time: self.rules.tick * ticks }
     }
 
     /// Marks a rollout of which step rows were lost.
@@ -244,7 +253,6 @@ impl<W: Witness> Cycle<W> {
             learned: self.mind.learned,
             refused: self.mind.refused,
             practice: self.practice,
-            practice_steps: self.practice_steps,
             state: self
                 .went_on
                 .filter(|from| (from.phase, from.rollout) == (moment.phase, moment.rollout))
@@ -312,4 +320,10 @@ const fn format_finish(how: machine::Finish) -> &'static str {
         machine::Finish::Complete => "complete",
         machine::Finish::Aborted => "aborted",
     }
+}
+
+/// The ticks of a rollout that count as practice, as its rollout does.
+pub(super) fn practised_ticks(row: &EpisodeRow) -> u64 {
+    let counts = row.phase.is_steered() && !matches!(row.end, End::Discarded | End::Aborted);
+    if counts { u64::from(row.steps) } else { 0 }
 }

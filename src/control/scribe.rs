@@ -114,7 +114,6 @@ impl Witness for Scribe {
             learned,
             refused,
             practice: standing.practice,
-            practice_steps: standing.practice_steps,
             state: standing.state,
             tenths: standing.tenths,
             steps_bytes: 0,
@@ -168,7 +167,6 @@ pub fn standing_of(checkpoint: Checkpoint<Model>, frozen: Option<Model>) -> Opti
         learned: checkpoint.learned,
         refused: checkpoint.refused,
         practice: checkpoint.practice,
-        practice_steps: checkpoint.practice_steps,
         state: checkpoint.state,
         tenths: checkpoint.tenths,
     })

@@ -19,10 +19,8 @@ pub struct Standing {
     pub learned: u64,
     /// and refused.
     pub refused: u64,
-    /// Rollouts that the operator has steered,
+    /// Rollouts that the operator has steered.
     pub practice: u32,
-    /// and their control steps.
-    pub practice_steps: u64,
     /// Where the rollout goes on, if it does not begin at the task's start.
     pub state: Option<State>,
     /// Tenths of main whose policies are stored.

@@ -14,7 +14,7 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::{Operator, View};
+use super::{Operator, Practice, View};
 use crate::random::Place;
 use crate::signal::Intent;
 
@@ -160,7 +160,7 @@ impl Script {
 }
 
 impl Operator for Script {
-    fn begin(&mut self, place: Place, _practice: u32) {
+    fn begin(&mut self, place: Place, _practice: Practice) {
         let (phase, episode) = (Some(place.phase), Some(place.rollout));
         self.current = [(phase, episode), (phase, None), (None, episode), (None, None)]
             .into_iter()
@@ -195,7 +195,7 @@ mod tests {
     }
 
     fn follow(script: &mut Script, phase: u8, rollout: u32, times: &[f64]) -> Vec<f64> {
-        script.begin(Place { phase, rollout, attempt: 0 }, 0);
+        script.begin(Place { phase, rollout, attempt: 0 }, Practice::default());
         let state = State::default();
         let view = |t| View { state: &state, now: Seconds(0.0), rollout_time: Seconds(t) };
         times.iter().map(|t| script.intent(view(*t)).action().0).collect()

@@ -16,15 +16,20 @@
 //! | mouse-limited | 1.1, 1.2 | 1.2, 1.3 | 1.6, 1.6 |
 //! | lapses | 1.2, 1.6 | 1.4, 1.8 | 2.7, 2.7 |
 
-mod cart_pole;
+pub mod ball_beam;
+pub mod cart_pole;
 mod filters;
-mod params;
+mod growth;
+mod law;
+pub mod mountain_car;
+pub mod person;
+pub mod swing_up;
 
 use std::fmt;
 use std::str::FromStr;
 
-pub use cart_pole::Simulated;
-pub use params::{BySkill, NaiveAverageExpert, Params, Practice};
+pub use cart_pole::{Balancer as Simulated, Params};
+pub use growth::{BySkill, Growth, NaiveAverageExpert};
 
 /// How well an operator steers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +71,16 @@ impl Skill {
             Self::Naive => "naive",
             Self::Average => "average",
             Self::Expert => "expert",
+        }
+    }
+
+    /// This skill's value.
+    #[must_use]
+    pub const fn of(self, (naive, average, expert): NaiveAverageExpert) -> f64 {
+        match self {
+            Self::Naive => naive,
+            Self::Average => average,
+            Self::Expert => expert,
         }
     }
 }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub use hold::{Direction, Hold, KeyReleases, Timing};
 
 use super::shaping::Shaping;
-use super::{Operator, View};
+use super::{Operator, Practice, View};
 use crate::check::{Check, Checker};
 use crate::clock::{Clock, WallClock};
 use crate::random::Place;
@@ -178,7 +178,7 @@ impl Keyboard {
 
 impl Operator for Keyboard {
     /// A key that is held through the countdown goes on pushing.
-    fn begin(&mut self, _place: Place, _practice: u32) {}
+    fn begin(&mut self, _place: Place, _practice: Practice) {}
 
     fn intent(&mut self, _view: View<'_>) -> Intent {
         let now = self.clock.now();

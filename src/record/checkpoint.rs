@@ -36,9 +36,6 @@ pub struct Checkpoint<M> {
     pub refused: u64,
     /// Rollouts that the operator steered so far.
     pub practice: u32,
-    /// Their control steps.
-    #[serde(default)]
-    pub practice_steps: u64,
     /// Where the next rollout goes on, if it does not begin at the task's start.
     #[serde(default)]
     pub state: Option<State>,

@@ -106,7 +106,6 @@ pub fn checkpoint(rollout: u32) -> Box<Checkpoint<Model>> {
         learned: 3,
         refused: 0,
         practice: rollout,
-        practice_steps: 0,
         state: None,
         tenths: 0,
         steps_bytes: 0,

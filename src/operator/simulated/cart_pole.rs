@@ -1,230 +1,30 @@
 //! A simulated person who balances the cart-pole.
 //!
-//! Eyes (delay, noise, dead zone) → judgement (a linear law, as the kind applies it) →
-//! hand (motor noise, lag, limit). Values and spreads: [`Params`].
+//! A delayed linear law ([`Params`]), applied as the kind's habit does; practice is counted
+//! in rollouts.
 
-use rand::RngExt;
+mod params;
+
 use rand_chacha::ChaCha8Rng;
 
-use super::filters::{DelayLine, Lag, Wander, normal};
-use super::{BySkill, Kind, Params, Skill};
-use crate::operator::{Operator, View};
-use crate::plant::{self, Plant};
-use crate::random::{Place, Purpose, stream};
-use crate::signal::{Action, Intent, Seconds, State};
+pub use params::Params;
+
+use super::filters::DelayLine;
+use super::law::Law;
+use super::person::{Foresight, Judgement, Person};
+use super::{Kind, Skill};
+use crate::operator::{Operator, Practice, View};
+use crate::plant::cart_pole;
+use crate::random::Place;
+use crate::signal::{Intent, Seconds};
 
 /// A simulated operator of the cart-pole; the state must be `[x, ẋ, θ, θ̇]`.
 ///
 /// Equal parameters, seed and rollouts give equal actions, bit for bit.
 #[derive(Clone, Debug)]
-pub struct Simulated {
-    params: Params,
-    kind: Kind,
-    seed: u64,
-    tick: Seconds,
-    plant: plant::cart_pole::Params,
-    traits: Traits,
-    mind: Mind,
-    seen: DelayLine<4>,
-    done: DelayLine<1>,
-}
+pub struct Balancer(Person<4, Balancing>);
 
-/// What stays the same in an operator's life: factors on the common values.
-#[derive(Clone, Debug)]
-struct Traits {
-    skill_first: f64,
-    skill_last: f64,
-    extra_delay: f64,
-    theta_noise: f64,
-    theta_dot_noise: f64,
-    dead_zone: f64,
-    theta_gain: f64,
-    theta_dot_gain: f64,
-    x_gain: f64,
-    x_dot_gain: f64,
-    motor_fraction: f64,
-    motor_noise: f64,
-}
-
-impl Traits {
-    fn draw(params: &Params, skill: Skill, seed: u64) -> Self {
-        let mut rng = stream(seed, Purpose::OperatorTraits, Place::default());
-        let practice = params.practice(skill);
-        let spread = practice.trait_spread;
-        let skill_last = practice.skill_last + practice.skill_last_sd * normal(&mut rng);
-        let extra_delay = spread * params.delay_sd_s * normal(&mut rng);
-        let theta_gain = (spread * params.theta_gain_trait_sd * normal(&mut rng)).exp();
-        let mut factor = || (spread * params.trait_sd * normal(&mut rng)).exp();
-        Self {
-            skill_first: practice.skill_first,
-            skill_last,
-            extra_delay,
-            theta_gain,
-            theta_dot_gain: factor(),
-            x_gain: factor(),
-            x_dot_gain: factor(),
-            theta_noise: factor(),
-            theta_dot_noise: factor(),
-            dead_zone: factor(),
-            motor_fraction: factor(),
-            motor_noise: factor(),
-        }
-    }
-
-    /// The skill after `practice` rollouts.
-    fn skill(&self, practice: u32, params: &Params) -> f64 {
-        let left = (-f64::from(practice) / params.practice_rollouts).exp();
-        self.skill_last + (self.skill_first - self.skill_last) * left
-    }
-
-    fn delay(&self, skill: f64, params: &Params) -> f64 {
-        (at(params.delay_s, skill) + self.extra_delay).max(0.0)
-    }
-}
-
-/// The line through the values at skill 0 and 1.
-fn at((first, second): BySkill, skill: f64) -> f64 {
-    first + (second - first) * skill
-}
-
-/// The same for what cannot be negative.
-fn at_least_0(values: BySkill, skill: f64) -> f64 {
-    at(values, skill).max(0.0)
-}
-
-/// The operator within one rollout.
-#[derive(Clone, Debug)]
-struct Mind {
-    rng: ChaCha8Rng,
-    delay_ticks: f64,
-    theta_noise: f64,
-    theta_dot_noise: f64,
-    dead_zone: f64,
-    gains: [f64; 4],
-    motor_fraction: f64,
-    motor_noise: f64,
-    lapse_chance: f64,
-    theta_error: Wander,
-    theta_dot_error: Wander,
-    tremor: Wander,
-    hand: Lag,
-    sustained: Lag,
-    model: Option<Model>,
-    /// Until when a decision (`intermittent`) or a lapse holds, s left.
-    left: f64,
-    decision: f64,
-}
-
-impl Mind {
-    fn new(operator: &Origin<'_>, place: Place, practice: u32) -> Self {
-        let Origin { params: p, traits, kind, seed, tick, plant } = *operator;
-        let mut rng = stream(seed, Purpose::OperatorNoise, place);
-        let skill = traits.skill(practice, p);
-        let delay = traits.delay(skill, p);
-        let blur = match kind {
-            Kind::Predictor => at_least_0(p.model_noise_factor, skill),
-            _ => 1.0,
-        };
-        Self {
-            delay_ticks: delay / tick.0,
-            theta_noise: blur
-                * traits.theta_noise
-                * at_least_0(p.theta_noise_deg, skill).to_radians(),
-            theta_dot_noise: blur
-                * traits.theta_dot_noise
-                * at_least_0(p.theta_dot_noise_deg_s, skill).to_radians(),
-            dead_zone: traits.dead_zone * at_least_0(p.dead_zone_deg, skill).to_radians(),
-            gains: [
-                traits.x_gain * at(p.x_gain_n_m, skill),
-                traits.x_dot_gain * at(p.x_dot_gain_n_s_m, skill),
-                traits.theta_gain * at(p.theta_gain_n_rad, skill),
-                traits.theta_dot_gain * at(p.theta_dot_gain_n_s_rad, skill),
-            ],
-            motor_fraction: traits.motor_fraction * at_least_0(p.motor_noise_fraction, skill),
-            motor_noise: traits.motor_noise * at_least_0(p.motor_noise_n, skill),
-            lapse_chance: at_least_0(p.lapses_per_s, skill) * tick.0,
-            theta_error: Wander::new(p.noise_correlation_s, tick, &mut rng),
-            theta_dot_error: Wander::new(p.noise_correlation_s, tick, &mut rng),
-            tremor: Wander::new(p.noise_correlation_s, tick, &mut rng),
-            hand: Lag::new(p.lag_s, tick),
-            sustained: Lag::new(p.travel_s, tick),
-            model: (kind == Kind::Predictor)
-                .then(|| Model::new(plant, p.model_length_factor, delay, tick)),
-            left: 0.0,
-            decision: 0.0,
-            rng,
-        }
-    }
-}
-
-/// What a [`Mind`] is made from.
-#[derive(Clone, Copy)]
-struct Origin<'a> {
-    params: &'a Params,
-    traits: &'a Traits,
-    kind: Kind,
-    seed: u64,
-    tick: Seconds,
-    plant: &'a plant::cart_pole::Params,
-}
-
-/// The cart-pole in a predictor's head: it rolls the late state on to now.
-#[derive(Clone, Debug)]
-struct Model {
-    plant: plant::cart_pole::CartPole,
-    steps: u32,
-    /// A step in ticks; all steps together make the delay.
-    step_ticks: f64,
-}
-
-impl Model {
-    fn new(
-        plant: &plant::cart_pole::Params,
-        length_factor: f64,
-        delay: f64,
-        tick: Seconds,
-    ) -> Self {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a small count of ticks, at least 0"
-        )]
-        let steps = (delay / tick.0).ceil() as u32;
-        let step = delay / f64::from(steps.max(1));
-        let imagined = plant::cart_pole::Params {
-            pole_length_m: plant.pole_length_m * length_factor,
-            friction_noise_per_s: 0.0,
-            // Nobody imagines motion finer than they can see it.
-            substeps: 1,
-            ..plant.clone()
-        };
-        Self {
-            plant: plant::cart_pole::CartPole::new(imagined, Seconds(step)),
-            steps,
-            step_ticks: step / tick.0,
-        }
-    }
-
-    /// The state now, from the state as it was and the forces given since.
-    fn foresee(&mut self, past: [f64; 4], done: &DelayLine<1>) -> [f64; 4] {
-        let mut state = State::new(past);
-        for step in 0..self.steps {
-            // The newest force acted during the last tick; a step takes the force that
-            // acted in its middle.
-            let age = (f64::from(self.steps - step) - 0.5) * self.step_ticks;
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a small count of ticks, at least 0"
-            )]
-            let [force] = done.back(age as usize);
-            state = self.plant.step(&state, Action(force));
-        }
-        <[f64; 4]>::try_from(&state[..]).unwrap_or(past)
-    }
-}
-
-impl Simulated {
+impl Balancer {
     /// An operator of `kind` and `skill` for a cart-pole with the parameters `plant` that
     /// is controlled every `tick`. `seed` decides the personal traits and all noise.
     #[must_use]
@@ -234,127 +34,118 @@ impl Simulated {
         kind: Kind,
         seed: u64,
         tick: Seconds,
-        plant: &plant::cart_pole::Params,
+        plant: &cart_pole::Params,
     ) -> Self {
-        let traits = Traits::draw(params, skill, seed);
-        let longest =
-            traits.delay(traits.skill_first, params).max(traits.delay(traits.skill_last, params));
-        let origin = Origin { params, traits: &traits, kind, seed, tick, plant };
-        Self {
-            mind: Mind::new(&origin, Place::default(), 0),
-            seen: DelayLine::reaching(longest / tick.0),
-            done: DelayLine::reaching(longest / tick.0),
-            params: params.clone(),
-            kind,
-            seed,
-            tick,
-            plant: plant.clone(),
-            traits,
-        }
-    }
-
-    /// What the operator believes the state to be.
-    fn perceive(&mut self) -> [f64; 4] {
-        let mind = &mut self.mind;
-        let mut state = self.seen.at(mind.delay_ticks);
-        state[2] += mind.theta_noise * mind.theta_error.next(&mut mind.rng);
-        state[3] += mind.theta_dot_noise * mind.theta_dot_error.next(&mut mind.rng);
-        match &mut mind.model {
-            Some(model) => model.foresee(state, &self.done),
-            None => state,
-        }
-    }
-
-    /// The force that the operator's law asks for.
-    fn judge(&self, [x, x_dot, theta, theta_dot]: [f64; 4]) -> f64 {
-        let [x_gain, x_dot_gain, theta_gain, theta_dot_gain] = self.mind.gains;
-        let tilt = theta - theta.clamp(-self.mind.dead_zone, self.mind.dead_zone);
-        theta_gain * tilt + theta_dot_gain * theta_dot + x_gain * x + x_dot_gain * x_dot
-    }
-
-    /// The force as the kind's habit turns it.
-    fn apply_habit(&mut self, force: f64) -> f64 {
-        let (p, mind) = (&self.params, &mut self.mind);
-        match self.kind {
-            Kind::DelayedPd | Kind::Predictor | Kind::MouseLimited => force,
-            Kind::Intermittent => {
-                mind.left -= self.tick.0;
-                if mind.left <= 0.0 {
-                    let (shortest, longest) = p.decision_hold_s;
-                    mind.left = shortest + (longest - shortest) * mind.rng.random::<f64>();
-                    mind.decision = force;
-                }
-                mind.decision
-            }
-            Kind::BangBang if force.abs() > p.bang_threshold_n => force.signum() * p.bang_force_n,
-            Kind::BangBang => 0.0,
-            Kind::Lapses => {
-                mind.left -= self.tick.0;
-                if mind.left <= 0.0 && mind.rng.random::<f64>() < mind.lapse_chance {
-                    mind.left = p.lapse_s;
-                }
-                if mind.left > 0.0 { -force } else { force }
-            }
-        }
-    }
-
-    /// The force that arrives at the device.
-    fn hand(&mut self, wanted: f64) -> f64 {
-        let mind = &mut self.mind;
-        let noisy = wanted * (1.0 + mind.motor_fraction * normal(&mut mind.rng))
-            + mind.motor_noise * mind.tremor.next(&mut mind.rng);
-        let moved = mind.hand.follow(noisy);
-        let kept = match self.kind {
-            Kind::MouseLimited => moved - mind.sustained.follow(moved),
-            _ => moved,
-        };
-        kept.clamp(-self.plant.force_limit_n, self.plant.force_limit_n)
+        let character = params.character(skill, plant.force_limit_n);
+        let correlation_s = params.noise_correlation_s;
+        let model = (kind == Kind::Predictor)
+            .then(|| Imagined::new(plant, params.model_length_factor, tick));
+        Self(Person::new(character, kind, seed, tick, |factors| Balancing {
+            law: Law::draw(params.law(), model.is_some(), correlation_s, tick, factors),
+            model,
+        }))
     }
 }
 
-impl Operator for Simulated {
-    fn begin(&mut self, place: Place, practice: u32) {
-        let origin = Origin {
-            params: &self.params,
-            traits: &self.traits,
-            kind: self.kind,
-            seed: self.seed,
-            tick: self.tick,
-            plant: &self.plant,
-        };
-        self.mind = Mind::new(&origin, place, practice);
-        self.seen.clear();
-        self.done.clear();
+impl Operator for Balancer {
+    fn begin(&mut self, place: Place, practice: Practice) {
+        self.0.begin(place, practice);
     }
 
     fn intent(&mut self, view: View<'_>) -> Intent {
-        let Ok(state) = <[f64; 4]>::try_from(&view.state[..]) else { return Intent::Absent };
-        self.seen.push(state);
-        let believed = self.perceive();
-        let wanted = self.judge(believed);
-        let wanted = self.apply_habit(wanted);
-        let force = self.hand(wanted);
-        self.done.push([force]);
-        Intent::fresh(force)
+        self.0.intent(view)
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Balancing {
+    law: Law,
+    model: Option<Imagined>,
+}
+
+impl Judgement<4> for Balancing {
+    fn begin(&mut self, rng: &mut ChaCha8Rng) {
+        self.law.begin(rng);
+    }
+
+    fn renew(&mut self, skill: f64, delay: Seconds) {
+        self.law.renew(skill);
+        if let Some(model) = &mut self.model {
+            model.renew(delay);
+        }
+    }
+
+    fn wish(&mut self, past: [f64; 4], done: &DelayLine<1>, rng: &mut ChaCha8Rng) -> f64 {
+        let seen = self.law.see(past, rng);
+        let believed = match &mut self.model {
+            Some(model) => model.foresee(seen, done),
+            None => seen,
+        };
+        self.law.force(believed)
+    }
+}
+
+/// The cart-pole in a predictor's head.
+#[derive(Clone, Debug)]
+pub(super) struct Imagined {
+    plant: cart_pole::Params,
+    tick: Seconds,
+    foresight: Foresight<cart_pole::CartPole>,
+}
+
+impl Imagined {
+    /// The true plant but for the pole's length, which is off by `length_factor`.
+    pub(super) fn new(plant: &cart_pole::Params, length_factor: f64, tick: Seconds) -> Self {
+        let plant = cart_pole::Params {
+            pole_length_m: plant.pole_length_m * length_factor,
+            friction_noise_per_s: 0.0,
+            // Nobody imagines motion finer than they can see it.
+            substeps: 1,
+            ..plant.clone()
+        };
+        let foresight = Self::over(Seconds(0.0), tick, &plant);
+        Self { plant, tick, foresight }
+    }
+
+    fn over(
+        delay: Seconds,
+        tick: Seconds,
+        plant: &cart_pole::Params,
+    ) -> Foresight<cart_pole::CartPole> {
+        Foresight::new(delay, tick, |step| cart_pole::CartPole::new(plant.clone(), step))
+    }
+
+    pub(super) fn renew(&mut self, delay: Seconds) {
+        self.foresight = Self::over(delay, self.tick, &self.plant);
+    }
+
+    pub(super) fn foresee(&mut self, past: [f64; 4], done: &DelayLine<1>) -> [f64; 4] {
+        self.foresight.foresee(past, done)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use rand::RngExt;
+
     use super::*;
+    use crate::plant::Plant;
+    use crate::random::{Purpose, stream};
+    use crate::signal::{Action, State};
 
     const TICK: Seconds = Seconds(0.02);
 
     /// Balance times in s of `rollouts` rollouts after `practice` others.
     fn balance_times(skill: Skill, kind: Kind, seed: u64, rollouts: u32) -> Vec<f64> {
-        let plant = plant::cart_pole::Params::default();
-        let mut operator = Simulated::new(&Params::default(), skill, kind, seed, TICK, &plant);
-        let mut cart_pole = plant::cart_pole::CartPole::new(plant, TICK);
+        let plant = cart_pole::Params::default();
+        let mut operator = Balancer::new(&Params::default(), skill, kind, seed, TICK, &plant);
+        let mut cart_pole = cart_pole::CartPole::new(plant, TICK);
         (1..=rollouts)
             .map(|rollout| {
                 let place = Place { phase: 2, rollout, attempt: 0 };
                 cart_pole.reseed(stream(seed, Purpose::Friction, place));
-                operator.begin(place, 20 + rollout - 1);
+                operator
+                    .begin(place, Practice { rollouts: 20 + rollout - 1, ..Practice::default() });
                 let release = stream(seed, Purpose::Starts, place).random_range(-5.0..=5.0_f64);
                 let mut state = State::new([0.0, 0.0, release.to_radians(), 0.0]);
                 for tick in -150..1000 {
@@ -407,9 +198,9 @@ mod tests {
     }
 
     /// The first 400 actions of a rollout with the given seed at `place`.
-    fn actions(operator: &mut Simulated, place: Place) -> Vec<f64> {
-        operator.begin(place, 30);
-        let mut plant = plant::cart_pole::CartPole::new(operator.plant.clone(), TICK);
+    fn actions(operator: &mut Balancer, place: Place) -> Vec<f64> {
+        operator.begin(place, Practice { rollouts: 30, ..Practice::default() });
+        let mut plant = cart_pole::CartPole::new(cart_pole::Params::default(), TICK);
         let mut state = State::new([0.0, 0.0, 0.05, 0.0]);
         (0..400)
             .map(|_| {
@@ -423,10 +214,10 @@ mod tests {
 
     #[test]
     fn actions_repeat_by_seed_and_place_stay_within_the_limit_and_forget_the_rollout_before() {
-        let plant = plant::cart_pole::Params { force_limit_n: 2.0, ..Default::default() };
+        let plant = cart_pole::Params { force_limit_n: 2.0, ..Default::default() };
         for kind in Kind::ALL {
             let make =
-                |seed| Simulated::new(&Params::default(), Skill::Naive, kind, seed, TICK, &plant);
+                |seed| Balancer::new(&Params::default(), Skill::Naive, kind, seed, TICK, &plant);
             let place = |rollout| Place { phase: 1, rollout, attempt: 0 };
             let mut operator = make(5);
             let seventh = actions(&mut operator, place(7));
@@ -441,13 +232,11 @@ mod tests {
 
     #[test]
     fn a_noiseless_predictor_with_a_true_model_foresees_the_present() {
-        let params = plant::cart_pole::Params {
-            friction_noise_per_s: 0.0,
-            substeps: 1,
-            ..Default::default()
-        };
-        let mut model = Model::new(&params, 1.0, 0.2, TICK);
-        let mut plant = plant::cart_pole::CartPole::new(params, TICK);
+        let params =
+            cart_pole::Params { friction_noise_per_s: 0.0, substeps: 1, ..Default::default() };
+        let mut model = Imagined::new(&params, 1.0, TICK);
+        model.renew(Seconds(0.2));
+        let mut plant = cart_pole::CartPole::new(params, TICK);
         let mut done = DelayLine::reaching(10.0);
         let mut seen = DelayLine::reaching(10.0);
         let mut state = State::new([0.0, 0.0, 0.05, 0.0]);
@@ -475,26 +264,16 @@ mod tests {
             lag_s: 0.0,
             ..Params::default()
         };
-        let plant = plant::cart_pole::Params::default();
+        let plant = cart_pole::Params::default();
         let held = State::new([0.0, 0.0, 0.3, 0.0]);
         let late_force = |kind| {
-            let mut operator = Simulated::new(&calm, Skill::Expert, kind, 3, TICK, &plant);
-            operator.begin(Place::default(), 0);
+            let mut operator = Balancer::new(&calm, Skill::Expert, kind, 3, TICK, &plant);
+            operator.begin(Place::default(), Practice::default());
             let view = View { state: &held, now: TICK, rollout_time: TICK };
             (0..500).map(|_| operator.intent(view).action().0).last().unwrap()
         };
         assert!(late_force(Kind::DelayedPd) > 2.0);
         assert!(late_force(Kind::MouseLimited).abs() < 0.01);
         assert_eq!(late_force(Kind::BangBang), 3.0);
-    }
-
-    #[test]
-    fn practice_moves_skill_from_its_first_to_its_last_value() {
-        let params = Params::default();
-        let traits = Traits::draw(&params, Skill::Naive, 1);
-        assert!((traits.skill(0, &params) - 0.05).abs() < 1e-12);
-        let after_40 = traits.skill_last + (0.05 - traits.skill_last) / std::f64::consts::E;
-        assert!((traits.skill(40, &params) - after_40).abs() < 1e-12);
-        assert!((Traits::draw(&params, Skill::Expert, 1).skill(10, &params) - 1.2).abs() < 1e-12);
     }
 }

@@ -3,8 +3,7 @@
 //! Every part is sized for one tick and starts anew with each rollout; none allocates
 //! after its construction.
 
-use rand::Rng;
-use rand::RngExt;
+use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
 use crate::signal::Seconds;
@@ -92,9 +91,14 @@ pub(super) struct Wander {
 }
 
 impl Wander {
-    /// Noise in its stationary state; a correlation time of 0 is white noise.
-    pub(super) fn new(correlation_time: f64, tick: Seconds, rng: &mut impl Rng) -> Self {
-        Self { keep: decay(correlation_time, tick), value: normal(rng) }
+    /// No noise yet; a correlation time of 0 makes it white.
+    pub(super) fn still(correlation_time: f64, tick: Seconds) -> Self {
+        Self { keep: decay(correlation_time, tick), value: 0.0 }
+    }
+
+    /// Noise from now on, in its stationary state.
+    pub(super) fn restart(&mut self, rng: &mut impl Rng) {
+        self.value = normal(rng);
     }
 
     pub(super) fn next(&mut self, rng: &mut impl Rng) -> f64 {
@@ -147,7 +151,8 @@ mod tests {
     #[test]
     fn wandering_noise_has_unit_spread_and_the_named_memory() {
         let mut rng = stream(1, Purpose::OperatorNoise, Place::default());
-        let mut wander = Wander::new(0.15, TICK, &mut rng);
+        let mut wander = Wander::still(0.15, TICK);
+        wander.restart(&mut rng);
         let draws: Vec<f64> = (0..200_000).map(|_| wander.next(&mut rng)).collect();
         let mean = |values: &mut dyn Iterator<Item = f64>| {
             let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));

@@ -1,32 +1,14 @@
-//! The numbers of the simulated operators.
+//! The numbers of the cart-pole's balancers.
 
 use serde::{Deserialize, Serialize};
 
-use super::Skill;
 use crate::check::{Check, Checker};
+use crate::operator::simulated::growth::{self, Growth};
+use crate::operator::simulated::law::Numbers;
+use crate::operator::simulated::person::{Character, Span};
+use crate::operator::simulated::{BySkill, NaiveAverageExpert, Skill};
 
-/// A value at skill 0 and at skill 1; between and beyond, the line through both.
-pub type BySkill = (f64, f64);
-
-/// A value for each of [`Skill::ALL`].
-pub type NaiveAverageExpert = (f64, f64, f64);
-
-/// How an operator's skill grows, and how much operators differ.
-///
-/// Skill 0 is a first try, 1 a practised hand; above 1 the values are extrapolated.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Practice {
-    /// Skill before the first rollout.
-    pub skill_first: f64,
-    /// Skill after endless practice.
-    pub skill_last: f64,
-    /// Standard deviation of `skill_last` over operators.
-    pub skill_last_sd: f64,
-    /// Factor on the spread of all personal traits.
-    pub trait_spread: f64,
-}
-
-/// The simulated operators' parameters: a person at a cart-pole.
+/// The balancers' parameters: a person at a cart-pole.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
@@ -90,19 +72,45 @@ pub struct Params {
 }
 
 impl Params {
-    /// The practice of operators with `skill`.
-    #[must_use]
-    pub fn practice(&self, skill: Skill) -> Practice {
-        let of = |(naive, average, expert): NaiveAverageExpert| match skill {
-            Skill::Naive => naive,
-            Skill::Average => average,
-            Skill::Expert => expert,
-        };
-        Practice {
-            skill_first: of(self.skill_first),
-            skill_last: of(self.skill_last),
-            skill_last_sd: of(self.skill_last_sd),
-            trait_spread: of(self.trait_spread),
+    /// The law's part.
+    pub(in crate::operator::simulated) const fn law(&self) -> Numbers {
+        Numbers {
+            theta_noise_deg: self.theta_noise_deg,
+            theta_dot_noise_deg_s: self.theta_dot_noise_deg_s,
+            dead_zone_deg: self.dead_zone_deg,
+            theta_gain_n_rad: self.theta_gain_n_rad,
+            theta_dot_gain_n_s_rad: self.theta_dot_gain_n_s_rad,
+            x_gain_n_m: self.x_gain_n_m,
+            x_dot_gain_n_s_m: self.x_dot_gain_n_s_m,
+            model_noise_factor: self.model_noise_factor,
+            theta_gain_trait_sd: self.theta_gain_trait_sd,
+        }
+    }
+
+    /// The numbers of a person with `skill` whose force is limited.
+    pub(in crate::operator::simulated) fn character(&self, skill: Skill, limit: f64) -> Character {
+        Character {
+            growth: Growth {
+                skill_first: skill.of(self.skill_first),
+                skill_last: skill.of(self.skill_last),
+                skill_last_sd: skill.of(self.skill_last_sd),
+                trait_spread: skill.of(self.trait_spread),
+            },
+            span: Span::Rollouts(self.practice_rollouts),
+            delay_s: self.delay_s,
+            delay_sd_s: self.delay_sd_s,
+            trait_sd: self.trait_sd,
+            noise_correlation_s: self.noise_correlation_s,
+            lag_s: self.lag_s,
+            motor_noise_fraction: self.motor_noise_fraction,
+            motor_noise: self.motor_noise_n,
+            decision_hold_s: self.decision_hold_s,
+            bang: self.bang_force_n,
+            bang_threshold: self.bang_threshold_n,
+            travel_s: self.travel_s,
+            lapses_per_s: self.lapses_per_s,
+            lapse_s: self.lapse_s,
+            limit,
         }
     }
 }
@@ -144,17 +152,10 @@ impl Default for Params {
 
 impl Check for Params {
     fn check(&self, c: &mut Checker<'_>) {
-        let triples = [
-            ("skill_first", self.skill_first, 0.0..=2.0),
-            ("skill_last", self.skill_last, 0.0..=2.0),
-            ("skill_last_sd", self.skill_last_sd, 0.0..=0.5),
-            ("trait_spread", self.trait_spread, 0.0..=5.0),
-        ];
-        for (key, (naive, average, expert), range) in triples {
-            for value in [naive, average, expert] {
-                c.range(key, value, range.clone());
-            }
-        }
+        growth::check(
+            c,
+            [self.skill_first, self.skill_last, self.skill_last_sd, self.trait_spread],
+        );
         c.range("practice_rollouts", self.practice_rollouts, 0.1..=10_000.0);
         c.range("delay_sd_s", self.delay_sd_s, 0.0..=0.2);
         c.range("noise_correlation_s", self.noise_correlation_s, 0.0..=10.0);
@@ -177,20 +178,11 @@ impl Check for Params {
             ("x_dot_gain_n_s_m", self.x_dot_gain_n_s_m, -1000.0..=1000.0),
             ("motor_noise_fraction", self.motor_noise_fraction, 0.0..=5.0),
             ("motor_noise_n", self.motor_noise_n, 0.0..=1000.0),
-            ("decision_hold_s", self.decision_hold_s, 0.0..=10.0),
             ("model_noise_factor", self.model_noise_factor, 0.0..=100.0),
             ("lapses_per_s", self.lapses_per_s, 0.0..=100.0),
         ];
-        for (key, (first, second), range) in pairs {
-            c.range(key, first, range.clone());
-            c.range(key, second, range);
-        }
-        c.demand(
-            self.decision_hold_s.0 <= self.decision_hold_s.1,
-            "decision_hold_s",
-            format!("({}, {})", self.decision_hold_s.0, self.decision_hold_s.1),
-            "the shorter time first",
-        );
+        growth::check_pairs(c, pairs);
+        growth::check_hold(c, self.decision_hold_s);
     }
 }
 

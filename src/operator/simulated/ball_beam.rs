@@ -1,0 +1,181 @@
+//! A simulated person who rolls the ball on its beam as fast as the ends allow.
+//!
+//! The beam is swung against where the ball will be, and along with a slow ball to get it
+//! going. The servo has to be placed by hand: the voltage follows the distance between the
+//! wanted angle and the one that is felt.
+
+mod params;
+
+use rand_chacha::ChaCha8Rng;
+
+pub use params::Params;
+
+use super::filters::{DelayLine, Wander};
+use super::person::{Factors, Foresight, Judgement, Person, at_least_0};
+use super::{Kind, Skill};
+use crate::operator::{Operator, Practice, View};
+use crate::plant::ball_beam;
+use crate::random::Place;
+use crate::signal::{Intent, Seconds};
+
+/// A simulated operator of the ball and beam; the state must be `[x, ẋ, θ, θ̇]`.
+///
+/// A decision is an angle of the servo. The habits: `intermittent` holds it; `bang-bang`
+/// knows three angles; `predictor` foresees ball and servo with a model in the head, whose
+/// look-ahead then spans only what is left of it; `mouse-limited` cannot sustain a voltage;
+/// `lapses` tilt the wrong way.
+#[derive(Clone, Debug)]
+pub struct Roller(Person<4, Rolling>);
+
+impl Roller {
+    /// An operator of `kind` and `skill` for a ball and beam with the parameters `plant`
+    /// that is controlled every `tick`. `seed` decides the personal traits and all noise.
+    #[must_use]
+    pub fn new(
+        params: &Params,
+        skill: Skill,
+        kind: Kind,
+        seed: u64,
+        tick: Seconds,
+        plant: &ball_beam::Params,
+    ) -> Self {
+        let character = params.person.character(skill, params.swing_rad.1, plant.voltage_limit_v);
+        Self(Person::new(character, kind, seed, tick, |factors| {
+            Rolling::new(params, kind, tick, plant, factors)
+        }))
+    }
+}
+
+impl Operator for Roller {
+    fn begin(&mut self, place: Place, practice: Practice) {
+        self.0.begin(place, practice);
+    }
+
+    fn intent(&mut self, view: View<'_>) -> Intent {
+        self.0.intent(view)
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Rolling {
+    params: Params,
+    model: Option<Foresight<ball_beam::BallBeam>>,
+    imagined: ball_beam::Params,
+    tick: Seconds,
+    x_error: Wander,
+    x_dot_error: Wander,
+    factors: Personal,
+    x_noise: f64,
+    x_dot_noise: f64,
+    swing: f64,
+    look_ahead: f64,
+    slow: f64,
+    gain: f64,
+    /// The servo's angle as it is felt.
+    theta: f64,
+    /// The way of the last push of a slow ball.
+    way: f64,
+}
+
+/// A person's factors on the common values.
+#[derive(Clone, Copy, Debug)]
+struct Personal {
+    noise: f64,
+    swing: f64,
+    look_ahead: f64,
+    gain: f64,
+}
+
+impl Rolling {
+    fn new(
+        params: &Params,
+        kind: Kind,
+        tick: Seconds,
+        plant: &ball_beam::Params,
+        factors: &mut Factors,
+    ) -> Self {
+        let imagined = ball_beam::Params {
+            ball_gain_m_s2_rad: plant.ball_gain_m_s2_rad * params.model_gain_factor,
+            substeps: 1,
+            ..plant.clone()
+        };
+        let correlation_s = params.person.noise_correlation_s;
+        Self {
+            model: (kind == Kind::Predictor).then(|| foresight(Seconds(0.0), tick, &imagined)),
+            imagined,
+            tick,
+            x_error: Wander::still(correlation_s, tick),
+            x_dot_error: Wander::still(correlation_s, tick),
+            factors: Personal {
+                noise: factors.next(),
+                swing: factors.next(),
+                look_ahead: factors.with(params.look_ahead_trait_sd),
+                gain: factors.next(),
+            },
+            params: params.clone(),
+            x_noise: 0.0,
+            x_dot_noise: 0.0,
+            swing: 0.0,
+            look_ahead: 0.0,
+            slow: 0.0,
+            gain: 0.0,
+            theta: 0.0,
+            way: 1.0,
+        }
+    }
+}
+
+fn foresight(
+    delay: Seconds,
+    tick: Seconds,
+    plant: &ball_beam::Params,
+) -> Foresight<ball_beam::BallBeam> {
+    Foresight::new(delay, tick, |step| ball_beam::BallBeam::new(plant.clone(), step))
+}
+
+impl Judgement<4> for Rolling {
+    fn begin(&mut self, rng: &mut ChaCha8Rng) {
+        self.x_error.restart(rng);
+        self.x_dot_error.restart(rng);
+        self.theta = 0.0;
+        self.way = 1.0;
+    }
+
+    fn renew(&mut self, skill: f64, delay: Seconds) {
+        let (p, own) = (&self.params, &self.factors);
+        self.x_noise = own.noise * at_least_0(p.x_noise_m, skill);
+        self.x_dot_noise = own.noise * at_least_0(p.x_dot_noise_m_s, skill);
+        self.swing = own.swing * at_least_0(p.swing_rad, skill);
+        self.slow = at_least_0(p.slow_m_s, skill);
+        self.gain = own.gain * at_least_0(p.servo_gain_v_rad, skill);
+        let ahead = own.look_ahead * at_least_0(p.look_ahead_s, skill);
+        self.look_ahead = ahead;
+        if let Some(model) = &mut self.model {
+            *model = foresight(delay, self.tick, &self.imagined);
+            self.look_ahead = (ahead - delay.0).max(0.0);
+        }
+    }
+
+    fn wish(&mut self, past: [f64; 4], done: &DelayLine<1>, rng: &mut ChaCha8Rng) -> f64 {
+        let mut seen = past;
+        seen[0] += self.x_noise * self.x_error.next(rng);
+        seen[1] += self.x_dot_noise * self.x_dot_error.next(rng);
+        let [x, x_dot, theta, _] = match &mut self.model {
+            Some(model) => model.foresee(seen, done),
+            None => seen,
+        };
+        self.theta = theta;
+        if x_dot.abs() < self.slow && x.abs() < self.params.reach_m {
+            if x_dot != 0.0 {
+                self.way = x_dot.signum();
+            }
+            return self.way * self.swing;
+        }
+        let coming = x + x_dot * self.look_ahead;
+        -self.swing * (coming / self.params.reach_m).clamp(-1.0, 1.0)
+    }
+
+    fn act(&self, wish: f64) -> f64 {
+        self.gain * (wish - self.theta)
+    }
+}
