@@ -46,7 +46,7 @@ fn info() -> Info {
         scene: SceneInfo::CartPole(Geometry {
             pole_length_m: 1.0,
             track_length_m: Some(1.0),
-            fail_angle_rad: 30_f64.to_radians(),
+            fail_angle_rad: Some(30_f64.to_radians()),
         }),
         field_cap: 100,
         operator: "keyboard, releases reported".to_owned(),
@@ -241,7 +241,7 @@ fn an_endless_track_scrolls() {
     info.scene = SceneInfo::CartPole(Geometry {
         pole_length_m: 1.0,
         track_length_m: None,
-        fail_angle_rad: 30_f64.to_radians(),
+        fail_angle_rad: Some(30_f64.to_radians()),
     });
     let mut snapshot = running(Phase::Main);
     snapshot.state = State::new([3.1, 0.0, -0.4, 0.0]);

@@ -276,7 +276,7 @@ fn info(session: &Session) -> Info {
         scene: SceneInfo::CartPole(Geometry {
             pole_length_m: plant.pole_length_m,
             track_length_m: plant.track_length_m,
-            fail_angle_rad: rules.fail_deg.to_radians(),
+            fail_angle_rad: Some(rules.fail_deg.to_radians()),
         }),
         field_cap: profile.learner.max_fields,
         operator: sidecar.operator.clone(),
