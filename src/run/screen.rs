@@ -278,6 +278,7 @@ fn info(session: &Session) -> Info {
             track_length_m: plant.track_length_m,
             fail_angle_rad: Some(rules.fail_deg.to_radians()),
         }),
+        regions: None,
         field_cap: profile.learner.max_fields,
         operator: sidecar.operator.clone(),
     }

@@ -101,8 +101,7 @@ impl Place {
             .min((canvas.width() - beside) / (track + 2.0 * length))
             .max(1e-6);
         let least = if canvas.height() < f64::from(ROOM_FOR_WORDS) * DOTS_DOWN { 4.0 } else { 8.0 };
-        let cart_and_wheels =
-            ((0.13 * scale / DOTS_DOWN).round() * DOTS_DOWN).clamp(least, 20.0);
+        let cart_and_wheels = ((0.13 * scale / DOTS_DOWN).round() * DOTS_DOWN).clamp(least, 20.0);
         let wheel = 0.19 * cart_and_wheels;
         let middle_x = (canvas.width() / 2.0).floor();
         let offset = if geometry.track_length_m.is_some() { x_m * scale } else { 0.0 };
@@ -256,8 +255,11 @@ mod tests {
             for pole_length_m in [0.3, 0.6, 1.0, 2.0] {
                 let canvas = Canvas::new(columns, rows, Glyphs::Braille);
                 let fail = 30_f64.to_radians();
-                let geometry =
-                    Geometry { pole_length_m, track_length_m: Some(1.0), fail_angle_rad: Some(fail) };
+                let geometry = Geometry {
+                    pole_length_m,
+                    track_length_m: Some(1.0),
+                    fail_angle_rad: Some(fail),
+                };
                 for (x, angle) in [(0.0, 0.0), (0.5, fail), (-0.5, -fail), (0.5, -fail)] {
                     let place = Place::new(&canvas, &geometry, x);
                     let tip = place.beyond_pivot(pole_length_m, angle);
