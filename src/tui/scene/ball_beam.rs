@@ -110,7 +110,7 @@ pub fn draw(pen: &mut Pen<'_>, geometry: &Geometry, state: &[f64], light: Light)
     let mut canvas = Canvas::new(pen.width(), pen.height(), pen.look.glyphs);
     let place = Place::new(&canvas, geometry, servo);
     let half = geometry.beam_half_length_m;
-    let x = x.clamp(-half.abs(), half.abs());
+    let x = x.max(-half.abs()).min(half.abs());
     stand(&mut canvas, geometry, &place, servo);
     beam(&mut canvas, geometry, &place, x);
     ball(&mut canvas, &place, x, speed);
@@ -191,5 +191,66 @@ fn words(canvas: &mut Canvas, geometry: &Geometry, x_m: f64, speed: f64) {
         let word = if x_m.abs() >= geometry.beam_half_length_m { "END" } else { "HIT" };
         let column = if x_m < 0.0 { 9.0 } else { columns - 18.0 };
         canvas.text(column, row, &block(word), Role::Wait);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tui::palette::Glyphs;
+    use crate::tui::scene::tests::{in_all_glyphs, picture};
+
+    const GEOMETRY: Geometry = Geometry {
+        beam_half_length_m: 0.2125,
+        limit_m: 0.17,
+        servo_limit_rad: 1.46,
+        beam_limit_rad: 0.0873,
+    };
+
+    fn small(state: [f64; 4]) -> String {
+        picture((80, 15), Glyphs::Braille, |pen| draw(pen, &GEOMETRY, &state, Light::Go))
+    }
+
+    #[test]
+    fn a_ball_rolls() {
+        insta::assert_snapshot!("ball_rolls", small([0.05, 0.18, 0.3, 0.0]));
+        insta::assert_snapshot!("ball_hits", small([0.18, 0.4, -1.46, 0.0]));
+        insta::assert_snapshot!("ball_ends", small([-0.2125, -0.04, 1.46, 0.0]));
+        let wide = |pen: &mut Pen<'_>| draw(pen, &GEOMETRY, &[0.0, -0.3, 1.0, 0.0], Light::Wait);
+        insta::assert_snapshot!("ball_120x30", picture((120, 30), Glyphs::Braille, wide));
+        insta::assert_snapshot!("ball_glyphs", in_all_glyphs((80, 15), wide));
+    }
+
+    #[test]
+    fn an_end_is_named_only_while_the_ball_is_there() {
+        let seen = |x| small([x, 0.0, 0.0, 0.0]);
+        assert!(!seen(0.16).contains("HIT") && !seen(-0.16).contains("END"));
+        for x in [0.17, -0.2] {
+            assert!(seen(x).contains("HIT") && !seen(x).contains("END"));
+        }
+        assert!(seen(-0.2125).contains("END") && !seen(-0.2125).contains("HIT"));
+    }
+
+    #[test]
+    fn ball_and_beam_stay_in_the_picture_however_the_beam_is_tilted() {
+        for (columns, rows) in [(20, 5), (44, 8), (80, 14), (80, 19), (120, 30), (200, 14)] {
+            let canvas = Canvas::new(columns, rows, Glyphs::Braille);
+            for (servo, x) in [(-1.46, 0.2125), (-1.46, -0.2125), (1.46, 0.2125), (0.0, 0.0)] {
+                let place = Place::new(&canvas, &GEOMETRY, servo);
+                for above in [0.0, place.beam + 2.0 * place.ball] {
+                    let (x, y) = place.on_beam(x, above);
+                    let is_inside = (-1.0..=canvas.width()).contains(&x)
+                        && (-1.0..=canvas.height()).contains(&y);
+                    assert!(is_inside, "{columns}x{rows}: {x}, {y}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_positive_angle_lowers_the_right_end() {
+        let canvas = Canvas::new(80, 14, Glyphs::Braille);
+        let right = |servo| Place::new(&canvas, &GEOMETRY, servo).on_beam(0.2, 0.0).1;
+        assert!(right(0.5) > right(0.0) && right(0.0) > right(-0.5));
     }
 }

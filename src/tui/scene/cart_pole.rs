@@ -28,6 +28,11 @@ const BOB: f64 = 1.8;
 /// How many dots of the tip's past are drawn, and how long they lie apart, s.
 const TRAIL: (u8, f64) = (10, 0.02);
 
+/// Whether there is no room for words.
+fn is_ornament(canvas: &Canvas) -> bool {
+    canvas.height() < f64::from(ROOM_FOR_WORDS) * DOTS_DOWN
+}
+
 /// Half the pole's thickness in dots: to be seen at arm's length.
 fn pole_radius(scale: f64) -> f64 {
     (0.03 * scale).clamp(1.4, 4.0)
@@ -100,7 +105,7 @@ impl Place {
         let scale = ((room - bob) / length)
             .min((canvas.width() - beside) / (track + 2.0 * length))
             .max(1e-6);
-        let least = if canvas.height() < f64::from(ROOM_FOR_WORDS) * DOTS_DOWN { 4.0 } else { 8.0 };
+        let least = if is_ornament(canvas) { 4.0 } else { 8.0 };
         let cart_and_wheels = ((0.13 * scale / DOTS_DOWN).round() * DOTS_DOWN).clamp(least, 20.0);
         let wheel = 0.19 * cart_and_wheels;
         let middle_x = (canvas.width() / 2.0).floor();
@@ -189,13 +194,15 @@ fn trail(canvas: &mut Canvas, geometry: &Geometry, place: &Place, state: &[f64])
     let drift = if geometry.track_length_m.is_some() { speed * place.scale } else { 0.0 };
     let tip = place.beyond_pivot(geometry.pole_length_m, theta);
     let bob = BOB * pole_radius(place.scale);
+    // In an ornament it would hide the pole.
+    let size = if is_ornament(canvas) { 0.5 } else { 1.0 };
     for age in (1..=TRAIL.0).map(f64::from) {
         let ago = age * TRAIL.1;
         let then = place.beyond_pivot(geometry.pole_length_m, theta - turn * ago);
         let middle = (then.0 - drift * ago, then.1);
         // At rest there is none.
         if (middle.0 - tip.0).hypot(middle.1 - tip.1) > bob + 1.0 {
-            canvas.mote(middle, 1.9 - 0.12 * age, Role::Dim);
+            canvas.mote(middle, size * (1.9 - 0.12 * age), Role::Dim);
         }
     }
 }
@@ -243,6 +250,7 @@ fn squares(canvas: &mut Canvas, geometry: &Geometry, at: &Place, light: Light) {
 mod tests {
     use super::*;
     use crate::tui::palette::Glyphs;
+    use crate::tui::scene::tests::{in_all_glyphs, picture};
 
     /// A point in dots is inside the picture.
     fn is_inside(canvas: &Canvas, (x, y): Point) -> bool {
@@ -287,5 +295,47 @@ mod tests {
             (Place::new(&canvas, &geometry, -0.5), Place::new(&canvas, &geometry, 0.5));
         let up = left.cart.1 - left.beyond_pivot(1.0, 0.0).1;
         assert!((right.cart.0 - left.cart.0 - up).abs() < 1e-9);
+    }
+
+    const TURNING: Geometry =
+        Geometry { pole_length_m: 1.0, track_length_m: Some(1.0), fail_angle_rad: None };
+
+    #[test]
+    fn a_pole_that_turns_stays_in_the_picture_all_the_way_round() {
+        for (columns, rows) in [(55, 14), (80, 14), (73, 30), (120, 30), (40, 60)] {
+            let canvas = Canvas::new(columns, rows, Glyphs::Braille);
+            for (x, tenth) in (0..63_u8).flat_map(|k| [(-0.5, k), (0.0, k), (0.5, k)]) {
+                let place = Place::new(&canvas, &TURNING, x);
+                let tip = place.beyond_pivot(1.0, f64::from(tenth) / 10.0);
+                assert!(is_inside(&canvas, tip), "{columns}x{rows}, {tenth}: {tip:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn all_the_way_round() {
+        let draw =
+            |state: [f64; 4]| move |pen: &mut Pen<'_>| draw(pen, &TURNING, &state, Light::Go);
+        let small = |state| picture((80, 15), Glyphs::Braille, draw(state));
+        insta::assert_snapshot!("turning_hangs", small([0.0, 0.0, 3.14, 0.0]));
+        insta::assert_snapshot!("turning_swings", small([0.2, 1.0, 1.2, -9.0]));
+        insta::assert_snapshot!("turning_stands", small([-0.3, 0.0, 0.1, 0.3]));
+        let whirls = [0.2, 1.0, 2.2, 12.0];
+        insta::assert_snapshot!(
+            "turning_whirls_120x30",
+            picture((120, 30), Glyphs::Braille, draw(whirls))
+        );
+        insta::assert_snapshot!("turning_glyphs", in_all_glyphs((56, 14), draw(whirls)));
+        insta::assert_snapshot!("turning_ornament", in_all_glyphs((20, 5), draw(whirls)));
+    }
+
+    #[test]
+    fn the_trail_is_longer_the_faster_the_pole_turns_and_none_at_rest() {
+        let dots = |turn| {
+            let ascii = |pen: &mut Pen<'_>| draw(pen, &TURNING, &[0.0, 0.0, 1.0, turn], Light::Go);
+            picture((80, 15), Glyphs::Ascii, ascii).matches('.').count()
+        };
+        assert_eq!(dots(0.2), 0);
+        assert!(dots(4.0) > 0 && dots(12.0) > dots(4.0));
     }
 }

@@ -227,3 +227,49 @@ fn words(canvas: &mut Canvas, geometry: &Geometry, at: &Place, speed: f64, has_a
         canvas.text(at.pole / DOTS_ACROSS - 10.0, 0.0, &block("GOAL"), Role::Go);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tui::palette::Glyphs;
+    use crate::tui::scene::tests::{in_all_glyphs, picture};
+
+    const GEOMETRY: Geometry = Geometry { left: -1.2, goal: 0.5, speed_limit: 0.07 };
+
+    fn small(state: [f64; 2]) -> String {
+        picture((80, 15), Glyphs::Braille, |pen| draw(pen, &GEOMETRY, &state, Light::Go))
+    }
+
+    #[test]
+    fn a_car_climbs() {
+        insta::assert_snapshot!("car_at_the_foot", small([-0.5, 0.0]));
+        insta::assert_snapshot!("car_at_the_wall", small([-1.2, 0.0]));
+        insta::assert_snapshot!("car_climbs", small([0.2, 0.06]));
+        insta::assert_snapshot!("car_at_the_goal", small([0.5, 0.03]));
+        let wide = |pen: &mut Pen<'_>| draw(pen, &GEOMETRY, &[-0.9, -0.05], Light::Wait);
+        insta::assert_snapshot!("car_120x30", picture((120, 30), Glyphs::Braille, wide));
+        insta::assert_snapshot!("car_glyphs", in_all_glyphs((80, 15), wide));
+    }
+
+    #[test]
+    fn the_goal_is_named_when_it_is_reached() {
+        assert!(!small([0.49, 0.03]).contains("GOAL"));
+        assert!(small([0.5, 0.03]).contains("GOAL"));
+    }
+
+    #[test]
+    fn the_car_stays_in_the_picture() {
+        for (columns, rows) in [(20, 5), (44, 8), (80, 14), (80, 19), (120, 30), (200, 14)] {
+            let canvas = Canvas::new(columns, rows, Glyphs::Braille);
+            let place = Place::new(&canvas, &GEOMETRY);
+            for x in [-1.2, -0.5, 0.0, 0.5] {
+                let car = Car::new(&place, x);
+                for (x, y) in [car.rear, car.front] {
+                    let is_inside = (0.0..=canvas.width()).contains(&x)
+                        && (car.wheel..=canvas.height()).contains(&y);
+                    assert!(is_inside, "{columns}x{rows}: {x}, {y}");
+                }
+            }
+        }
+    }
+}

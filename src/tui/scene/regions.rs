@@ -351,3 +351,64 @@ fn bar(
 fn percent(part: f64, width: usize) -> String {
     format!("{} %", fixed(part * 100.0, width, 0))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tui::scene::tests::{in_all_glyphs, picture};
+
+    /// Table 1 of the thesis.
+    const BORDERS: Borders = Borders {
+        down_rad: 120_f64.to_radians(),
+        top_slow_rad: 30_f64.to_radians(),
+        top_fast_rad: 40_f64.to_radians(),
+        down_fast: 8.0,
+        middle_fast: 3.0,
+        top_fast: 1.0,
+        fastest: 20.0,
+    };
+
+    fn seen(current: usize, theta: f64, theta_dot: f64) -> Map<'static> {
+        Map {
+            borders: &BORDERS,
+            names: &NAMES,
+            shares: Some(&[0.03, 0.05, 0.22, 0.48, 0.74, 1.0]),
+            successes: Some(&[0.97, 0.95, 0.74, 0.5, 0.3, 0.1]),
+            current,
+            theta,
+            theta_dot,
+        }
+    }
+
+    #[test]
+    fn the_map_at_all_its_sizes() {
+        let at = |size, map: Map<'_>| picture(size, Glyphs::Braille, |pen| draw(pen, &map));
+        insta::assert_snapshot!("regions_24x11", at((24, 11), seen(2, 1.2, 2.0)));
+        insta::assert_snapshot!("regions_24x15", at((24, 15), seen(5, 0.6, -15.0)));
+        insta::assert_snapshot!("regions_48x30", at((48, 30), seen(0, 3.1, 1.0)));
+        insta::assert_snapshot!("regions_19x8", at((19, 8), seen(3, -1.0, -9.0)));
+        insta::assert_snapshot!("regions_70x2", at((70, 2), seen(3, -1.0, -9.0)));
+        let glyphs = in_all_glyphs((48, 30), |pen| draw(pen, &seen(3, -1.0, -9.0)));
+        insta::assert_snapshot!("regions_glyphs", glyphs);
+    }
+
+    #[test]
+    fn what_is_hidden_is_not_shown() {
+        let hidden = Map { shares: None, successes: None, ..seen(4, 0.1, 0.2) };
+        let drawn = picture((48, 30), Glyphs::Braille, |pen| draw(pen, &hidden));
+        assert!(!drawn.contains('%') && !drawn.contains('▒') && drawn.contains("TOP SLOW"));
+    }
+
+    #[test]
+    fn the_dot_goes_with_height_and_speed() {
+        let part = |region, degrees: f64, speed| BORDERS.part(region, degrees.to_radians(), speed);
+        let near = |(x, y): (f64, f64), (a, b): (f64, f64)| {
+            assert!((x - a).abs() < 1e-9 && (y - b).abs() < 1e-6, "{x} {y}");
+        };
+        near(part(0, 180.0, 0.0), (0.0, 1.0));
+        near(part(0, -120.0, 4.0), (0.5, 0.0));
+        near(part(2, 75.0, -1.5), (0.5, 0.5));
+        near(part(3, 400.0, 11.5), (0.5, 0.0));
+        near(part(5, 20.0, 99.0), (1.0, 0.5));
+    }
+}
