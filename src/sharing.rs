@@ -138,7 +138,9 @@ impl Check for Params {
                 self.gate > 0.0,
                 "gate",
                 self.gate,
-                &format!("above 0 when {key} is None, since τ is then found from the gate (eq. 23)"),
+                &format!(
+                    "above 0 when {key} is None, since τ is then found from the gate (eq. 23)"
+                ),
             ),
         }
         c.range("tau_floor_steps", self.tau_floor_steps, TAU);

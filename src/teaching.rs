@@ -268,11 +268,8 @@ mod tests {
 
     #[test]
     fn only_the_named_regions_are_delayed() {
-        let params = Params {
-            delay_s: 0.04,
-            delay_regions: vec!["top".to_owned()],
-            ..Params::default()
-        };
+        let params =
+            Params { delay_s: 0.04, delay_regions: vec!["top".to_owned()], ..Params::default() };
         let mut teacher = Teacher::new(&params, Seconds(0.02), &["down", "top"]);
         let mut at = |k, region| {
             let seen = Sight { region, ..sight(k, Intent::fresh(1.0)) };
@@ -299,8 +296,7 @@ mod tests {
 
     #[test]
     fn a_new_rollout_knows_nothing_of_the_one_before() {
-        let params =
-            Params { delay_s: 0.06, outcome_s: Some(0.04), ..Params::default() };
+        let params = Params { delay_s: 0.06, outcome_s: Some(0.04), ..Params::default() };
         let mut teacher = Teacher::new(&params, Seconds(0.02), &["all"]);
         for k in 0..9 {
             teacher.see(&sight(k, Intent::fresh(0.0)));

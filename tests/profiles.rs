@@ -4,7 +4,9 @@
 
 use std::path::{Path, PathBuf};
 
-use coadapt::profile::{Document, Experiment, Origin, Profile, ProfileError, WantedMode, list, show};
+use coadapt::profile::{
+    Document, Experiment, Origin, Profile, ProfileError, WantedMode, list, show,
+};
 use proptest::prelude::*;
 
 const BALANCE: &str = include_str!("../profiles/balance.ron");

@@ -10,10 +10,12 @@ use coadapt::session::plan::{Instructions, Params, Plan};
 use coadapt::session::{Moment, Phase};
 use coadapt::sharing::weight::Opened;
 use coadapt::signal::{End, Intent, Seconds, State, Tallied, Tick};
-use coadapt::tui::live::{self, History, Info, SceneInfo, Ui, View};
+use coadapt::tui::live::{self, History, Info, Ui, View};
 use coadapt::tui::palette::{Glyphs, Look, Palette};
 use coadapt::tui::results;
+use coadapt::tui::scene::Scene;
 use coadapt::tui::scene::cart_pole::Geometry;
+use coadapt::tui::scene::{ball_beam, mountain_car, regions};
 use proptest::prelude::*;
 use ratatui::backend::{CrosstermBackend, TestBackend};
 use ratatui::layout::Rect;
@@ -43,14 +45,69 @@ fn info() -> Info {
         gate: 0.4,
         action_limit: 10.0,
         action_unit: "N".to_owned(),
-        scene: SceneInfo::CartPole(Geometry {
+        scene: Scene::CartPole(Geometry {
             pole_length_m: 1.0,
             track_length_m: Some(1.0),
-            fail_angle_rad: 30_f64.to_radians(),
+            fail_angle_rad: Some(30_f64.to_radians()),
         }),
+        regions: None,
         field_cap: 100,
         operator: "keyboard, releases reported".to_owned(),
     }
+}
+
+/// Table 1 of the thesis.
+const BORDERS: regions::Borders = regions::Borders {
+    down_rad: 120_f64.to_radians(),
+    top_slow_rad: 30_f64.to_radians(),
+    top_fast_rad: 40_f64.to_radians(),
+    down_fast: 8.0,
+    middle_fast: 3.0,
+    top_fast: 1.0,
+    fastest: 20.0,
+};
+
+/// Swing-up: the whole circle, and the map.
+fn swing_up() -> (Info, Snapshot) {
+    let mut info = Info { task: "swing-up".to_owned(), regions: Some(BORDERS), ..info() };
+    info.scene = Scene::CartPole(Geometry {
+        pole_length_m: 1.0,
+        track_length_m: Some(1.0),
+        fail_angle_rad: None,
+    });
+    let mut snapshot = running(Phase::Main);
+    snapshot.state = State::new([0.2, 0.4, 1.2, -2.2]);
+    snapshot.region = 2;
+    snapshot.shares = [0.03, 0.05, 0.22, 0.48, 0.74, 0.61, 1.0, 1.0];
+    snapshot.successes = [0.97, 0.95, 0.74, 0.52, 0.31, 0.4, 0.0, 0.0];
+    (info, snapshot)
+}
+
+#[test]
+fn the_map_beside_the_whole_circle() {
+    let (info, snapshot) = swing_up();
+    both("swing_up", &info, &snapshot, &Ui::default());
+    let hidden = Ui { show_progress: false, ..Ui::default() };
+    small("swing_up_progress_hidden", &info, &snapshot, &hidden);
+    let subject = Ui { subject_view: true, ..Ui::default() };
+    small("swing_up_subject", &info, &snapshot, &subject);
+}
+
+#[test]
+fn the_other_plants() {
+    let (mut info, mut snapshot) = (info(), running(Phase::Main));
+    info.scene = Scene::BallBeam(ball_beam::Geometry {
+        beam_half_length_m: 0.2125,
+        limit_m: 0.17,
+        servo_limit_rad: 1.46,
+        beam_limit_rad: 5_f64.to_radians(),
+    });
+    snapshot.state = State::new([0.05, 0.18, 0.6, 0.0]);
+    small("ball_beam", &info, &snapshot, &Ui::default());
+    info.scene =
+        Scene::MountainCar(mountain_car::Geometry { left: -1.2, goal: 0.5, speed_limit: 0.07 });
+    snapshot.state = State::new([-0.2, 0.03]);
+    small("mountain_car", &info, &snapshot, &Ui::default());
 }
 
 fn moment(phase: Phase) -> Moment {
@@ -239,10 +296,10 @@ fn without_colours_there_are_only_bold_and_reverse() {
 #[test]
 fn an_endless_track_scrolls() {
     let mut info = info();
-    info.scene = SceneInfo::CartPole(Geometry {
+    info.scene = Scene::CartPole(Geometry {
         pole_length_m: 1.0,
         track_length_m: None,
-        fail_angle_rad: 30_f64.to_radians(),
+        fail_angle_rad: Some(30_f64.to_radians()),
     });
     let mut snapshot = running(Phase::Main);
     snapshot.state = State::new([3.1, 0.0, -0.4, 0.0]);
@@ -424,9 +481,12 @@ proptest! {
         };
         let mut info = info();
         if flags & 16 == 0 {
-            let SceneInfo::CartPole(geometry) = &mut info.scene;
-            geometry.track_length_m = None;
-            geometry.pole_length_m = x;
+            info.scene = Scene::CartPole(Geometry {
+                pole_length_m: x,
+                track_length_m: None,
+                fail_angle_rad: (flags & 32 == 0).then_some(v),
+            });
+            info.regions = (flags & 64 == 0).then_some(BORDERS);
         }
         picture(width, height, &info, &snapshot, &ui);
         let mut state = results::State::new(ui.look);

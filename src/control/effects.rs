@@ -123,11 +123,8 @@ impl<W: Witness> Cycle<W> {
     /// Everyone begins anew with the rollout that starts at `start`.
     fn open(&mut self, moment: Moment, start: State) {
         let task = &*self.crew.task;
-        self.rollout = Rollout {
-            start: task.start_value(&start),
-            tally: task.tally(),
-            ..Rollout::default()
-        };
+        self.rollout =
+            Rollout { start: task.start_value(&start), tally: task.tally(), ..Rollout::default() };
         self.seen.state = start;
         self.teacher.begin();
         self.before_rollout = None;

@@ -14,9 +14,8 @@ pub fn regions(task: &dyn Task, earlier: &[EpisodeRow]) -> (Vec<Region>, Option<
     let practice = earlier.iter().filter(|row| {
         row.phase == Phase::Introduction && !matches!(row.end, End::Discarded | End::Aborted)
     });
-    let (total, steps) = practice.fold((0.0, 0.0), |(total, steps), row| {
-        (total + row.total, steps + f64::from(row.steps))
-    });
+    let (total, steps) = practice
+        .fold((0.0, 0.0), |(total, steps), row| (total + row.total, steps + f64::from(row.steps)));
     let mean = total / steps;
     match task.own_scale(mean).filter(|_| steps > 0.0) {
         Some(scale) => {

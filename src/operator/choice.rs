@@ -22,10 +22,7 @@ pub struct Params {
 
 impl Default for Params {
     fn default() -> Self {
-        Self {
-            keyboard: terminal::Params::default(),
-            sensitivity: 1.0,
-        }
+        Self { keyboard: terminal::Params::default(), sensitivity: 1.0 }
     }
 }
 

@@ -42,8 +42,7 @@ impl Keys {
             .into_iter()
             .filter_map(|entry| Some((entry.path, bare.get(entry.value)?)))
             .collect();
-        let mut keys =
-            Self { reader, leaves: Vec::new(), sections: Vec::new(), own: Vec::new() };
+        let mut keys = Self { reader, leaves: Vec::new(), sections: Vec::new(), own: Vec::new() };
         for entry in outline(&defaults) {
             let value = defaults.get(entry.value).unwrap_or_default();
             if entry.is_section {

@@ -29,13 +29,8 @@ pub struct Yardstick {
 /// The yardstick of `task`: balance time, pseudo-height, speed, or steps to the flag.
 #[must_use]
 pub fn yardstick(task: &str) -> Yardstick {
-    let yardstick = |name, unit, decimals, of| Yardstick {
-        name,
-        unit,
-        decimals,
-        more_is_better: true,
-        of,
-    };
+    let yardstick =
+        |name, unit, decimals, of| Yardstick { name, unit, decimals, more_is_better: true, of };
     match task {
         SwingUp::NAME => yardstick("mean height", "", 2, |row| tallied(row, 0)),
         SpeedUp::NAME => yardstick("mean speed", "m/s", 3, |row| tallied(row, 0)),
@@ -167,7 +162,9 @@ impl Achieved {
             Self::Balance { mean_balance_s: mean, sd_balance_s: sd, .. } => {
                 write!(line, "{mean:.2}{} s balanced {over}", spread(sd, 2))
             }
-            Self::SwingUp { mean_height: mean, sd_height: sd, top_share, longest_hold_s, .. } => {
+            Self::SwingUp {
+                mean_height: mean, sd_height: sd, top_share, longest_hold_s, ..
+            } => {
                 write!(
                     line,
                     "mean height {mean:+.2}{} {over}, {:.0} % of the time at the top, longest \

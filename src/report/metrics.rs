@@ -166,9 +166,8 @@ fn main_measures(task: &str, rows: &[EpisodeRow], end: &MainEnd) -> Option<MainM
             last10_mean_balance_s: mean(&times[times.len().saturating_sub(FEW)..]),
         }
     });
-    let over_regions = |of: fn(&RegionEnd) -> f64| {
-        mean(&end.regions.iter().map(of).collect::<Vec<_>>())
-    };
+    let over_regions =
+        |of: fn(&RegionEnd) -> f64| mean(&end.regions.iter().map(of).collect::<Vec<_>>());
     let has_regions = end.regions.len() > 1;
     Some(MainMeasures {
         common,

@@ -102,9 +102,9 @@ pub(super) fn conclude(
         match evaluation(profile, &tenths, sidecar.seed, &episodes, &signal) {
             Some(rows) => {
                 means = tenth_means(&sidecar.task, &tenths, &rows);
-                let rows = rows.iter().map(|(percent, row)| {
-                    EvaluationRow::of(format!("policy-{percent:03}"), row)
-                });
+                let rows = rows
+                    .iter()
+                    .map(|(percent, row)| EvaluationRow::of(format!("policy-{percent:03}"), row));
                 recorder.evaluation(rows.collect());
             }
             None => status = Status::Interrupted,
@@ -190,11 +190,7 @@ fn evaluation(
     Some(rows)
 }
 
-fn tenth_means(
-    task: &str,
-    tenths: &[(u8, Model)],
-    rows: &[(u8, EpisodeRow)],
-) -> Vec<(u8, f64)> {
+fn tenth_means(task: &str, tenths: &[(u8, Model)], rows: &[(u8, EpisodeRow)]) -> Vec<(u8, f64)> {
     tenths
         .iter()
         .map(|(percent, _)| {

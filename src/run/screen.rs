@@ -16,15 +16,15 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use crate::cli;
 use crate::clock::WallClock;
 use crate::operator::terminal::{self, Hands};
-use crate::profile::{self, Document, Experiment, Order, ProfileError};
+use crate::profile::{self, Document, Order, ProfileError};
 use crate::record::folder;
 use crate::session::Phase;
 use crate::session::plan::Plan;
 use crate::sharing::Mode;
 use crate::tui::app::{self, Conductor, End, Running, Start};
-use crate::tui::live::{Info, SceneInfo};
+use crate::tui::live::Info;
 use crate::tui::results;
-use crate::tui::scene::cart_pole::Geometry;
+use crate::tui::scene::{self, Scene};
 use crate::tui::setup::Shelf;
 use crate::tui::terminal::{Feed, Screen, give_back, is_taken};
 
@@ -251,18 +251,6 @@ fn info(session: &Session) -> Info {
         Mode::Simultaneous => &texts.simultaneous,
         Mode::Sequential => &texts.sequential,
     };
-    let scene = match &profile.experiment {
-        Experiment::Balance { plant, rules, .. } => SceneInfo::CartPole(Geometry {
-            pole_length_m: plant.pole_length_m,
-            track_length_m: plant.track_length_m,
-            fail_angle_rad: rules.fail_deg.to_radians(),
-        }),
-        _ => SceneInfo::CartPole(Geometry {
-            pole_length_m: 1.0,
-            track_length_m: None,
-            fail_angle_rad: 0.5,
-        }),
-    };
     Info {
         task: sidecar.task.clone(),
         preset: sidecar.preset.clone(),
@@ -284,7 +272,8 @@ fn info(session: &Session) -> Info {
         gate: profile.sharing.gate,
         action_limit: task.action_limit(),
         action_unit: profile.experiment.action_unit().to_owned(),
-        scene,
+        scene: Scene::of(&profile.experiment),
+        regions: scene::regions_of(&profile.experiment),
         field_cap: profile.learner.max_fields,
         operator: sidecar.operator.clone(),
     }

@@ -92,8 +92,7 @@ impl Weight {
         self.steps += 1;
         match self.opened {
             None if success >= dynamics.gate => {
-                self.opened =
-                    Some(Opened { step: self.steps, tau: dynamics.tau(self.steps) });
+                self.opened = Some(Opened { step: self.steps, tau: dynamics.tau(self.steps) });
                 true
             }
             None => false,

@@ -199,8 +199,9 @@ mod tests {
         assert!((deg(0, 100) + 5.0).abs() < 1e-12 && (deg(99, 100) - 5.0).abs() < 1e-12);
         assert_eq!(deg(0, 1), 0.0);
         let mut chance = stream(1, Purpose::Starts, Place::default());
-        let starts: Vec<f64> =
-            (0..1000).map(|_| task.random_start(Occasion::Taught, &mut chance)[2].to_degrees()).collect();
+        let starts: Vec<f64> = (0..1000)
+            .map(|_| task.random_start(Occasion::Taught, &mut chance)[2].to_degrees())
+            .collect();
         assert!(starts.iter().all(|a| a.abs() <= 5.0));
         assert!(starts.iter().any(|a| *a < -4.5) && starts.iter().any(|a| *a > 4.5));
     }

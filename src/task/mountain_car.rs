@@ -78,11 +78,7 @@ impl MountainCar {
     #[must_use]
     pub fn new(rules: &Params, plant: &mountain_car::Params) -> Self {
         let scale = Scale { minimum: rules.reward_min, threshold: rules.reward_threshold };
-        Self {
-            rules: rules.clone(),
-            plant: plant.clone(),
-            region: [Region { name: "all", scale }],
-        }
+        Self { rules: rules.clone(), plant: plant.clone(), region: [Region { name: "all", scale }] }
     }
 
     fn is_at_goal(&self, state: &State) -> bool {
@@ -135,9 +131,8 @@ impl Task for MountainCar {
         let across = (f64::from(count) * 15.0 / 16.0).sqrt().ceil();
         let up = (f64::from(count) / across).ceil();
         let (column, row) = (f64::from(index) % across, (f64::from(index) / across).floor());
-        let centre = |cell: f64, cells: f64, from: f64, to: f64| {
-            from + (to - from) * (cell + 0.5) / cells
-        };
+        let centre =
+            |cell: f64, cells: f64, from: f64, to: f64| from + (to - from) * (cell + 0.5) / cells;
         State::new([
             centre(column, across, left_wall, goal),
             centre(row, up, -speed_limit, speed_limit),
@@ -201,9 +196,8 @@ mod tests {
         let task = task();
         let (valley, flag) = (State::new([-0.5, 0.0]), State::new([0.5, 0.03]));
         let n = 120;
-        let total: f64 = (1..=n)
-            .map(|k| task.reward(&valley, if k == n { &flag } else { &valley }))
-            .sum();
+        let total: f64 =
+            (1..=n).map(|k| task.reward(&valley, if k == n { &flag } else { &valley })).sum();
         assert_eq!(total, 101.0 - f64::from(n));
     }
 

@@ -133,10 +133,13 @@ impl Task for SpeedUp {
     /// ± the set one.
     fn random_start(&self, occasion: Occasion, chance: &mut ChaCha8Rng) -> State {
         let push = self.rules.test_push_m_s;
-        Self::level(0.0, match occasion {
-            Occasion::Tested if push > 0.0 => chance.random_range(-push..=push),
-            _ => 0.0,
-        })
+        Self::level(
+            0.0,
+            match occasion {
+                Occasion::Tested if push > 0.0 => chance.random_range(-push..=push),
+                _ => 0.0,
+            },
+        )
     }
 
     /// With a push and from rest in turn, each to one side and the other in turn: many
@@ -172,11 +175,7 @@ impl Task for SpeedUp {
             Occasion::Taught => self.rollout_steps,
             Occasion::Tested => self.test_steps,
         };
-        if !state.is_finite() {
-            Some(End::Failed)
-        } else {
-            (steps >= all).then_some(End::Cap)
-        }
+        if !state.is_finite() { Some(End::Failed) } else { (steps >= all).then_some(End::Cap) }
     }
 
     fn regions(&self) -> &[Region] {

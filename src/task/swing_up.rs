@@ -296,11 +296,7 @@ impl Task for SwingUp {
             Occasion::Taught => self.rollout_steps,
             Occasion::Tested => self.test_steps,
         };
-        if !state.is_finite() {
-            Some(End::Failed)
-        } else {
-            (steps >= all).then_some(End::Cap)
-        }
+        if !state.is_finite() { Some(End::Failed) } else { (steps >= all).then_some(End::Cap) }
     }
 
     fn regions(&self) -> &[Region] {

@@ -54,7 +54,7 @@ impl Canvas {
     }
 
     /// Lights the dots between two corners whose middles are `inside`.
-    fn fill(&mut self, from: Point, to: Point, role: Role, inside: impl Fn(Point) -> bool) {
+    pub fn fill(&mut self, from: Point, to: Point, role: Role, inside: impl Fn(Point) -> bool) {
         if !(from.0 + from.1 + to.0 + to.1).is_finite() {
             return;
         }
@@ -69,12 +69,24 @@ impl Canvas {
         }
     }
 
-    fn light(&mut self, x: u16, y: u16, role: Role) {
+    /// The cell that a dot lies in, and the dot's bit there.
+    fn dot(&mut self, x: u16, y: u16) -> Option<(&mut Cell, u8)> {
         const BITS: [[u8; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
         let index = usize::from(y / 4) * usize::from(self.columns) + usize::from(x / 2);
-        if let Some(cell) = self.cells.get_mut(index) {
-            cell.lit |= BITS[usize::from(x % 2)][usize::from(y % 4)];
+        let bit = BITS[usize::from(x % 2)][usize::from(y % 4)];
+        self.cells.get_mut(index).map(|cell| (cell, bit))
+    }
+
+    fn light(&mut self, x: u16, y: u16, role: Role) {
+        if let Some((cell, bit)) = self.dot(x, y) {
+            cell.lit |= bit;
             cell.role = Some(role);
+        }
+    }
+
+    fn put_out(&mut self, x: u16, y: u16) {
+        if let Some((cell, bit)) = self.dot(x, y) {
+            cell.lit &= !bit;
         }
     }
 
@@ -92,6 +104,28 @@ impl Canvas {
             return;
         }
         self.capsule(middle, middle, radius, role);
+    }
+
+    /// A small round dot, such as one of a trail; where there are no dots a full stop.
+    pub fn mote(&mut self, middle: Point, radius: f64, role: Role) {
+        if self.glyphs == Glyphs::Ascii {
+            let (column, row) = in_cells(middle);
+            self.glyph(column, row, '.', role);
+            return;
+        }
+        self.capsule(middle, middle, radius, role);
+    }
+
+    /// Puts out the dots at most `radius` away from a segment, so that what is drawn there
+    /// next stands in front of what was there before.
+    pub fn clear(&mut self, from: Point, to: Point, radius: f64) {
+        for y in 0..self.rows * 4 {
+            for x in 0..self.columns * 2 {
+                if distance((f64::from(x) + 0.5, f64::from(y) + 0.5), from, to) <= radius {
+                    self.put_out(x, y);
+                }
+            }
+        }
     }
 
     /// A thick line with round ends: all that is at most `radius` away from a segment.
@@ -164,6 +198,9 @@ impl Canvas {
     pub fn draw(&self, pen: &mut Pen<'_>) {
         for (cell, index) in self.cells.iter().zip(0_u32..) {
             let Some(role) = cell.role else { continue };
+            if cell.lit == 0 && cell.glyph.is_none() {
+                continue;
+            }
             let glyph = cell.glyph.unwrap_or_else(|| self.shown(cell.lit));
             let columns = u32::from(self.columns);
             let at = |place: u32| u16::try_from(place).unwrap_or(u16::MAX);

@@ -1,5 +1,6 @@
 //! The live screen: the plant at a glance, the session's state in fixed places below it.
 
+mod map;
 mod overlay;
 mod panels;
 pub mod strip;
@@ -9,7 +10,7 @@ use ratatui::Frame;
 use super::keys::Screen;
 use super::palette::{Look, Role};
 use super::pen::Pen;
-use super::scene::{Light, cart_pole};
+use super::scene::{Light, Scene, regions};
 use super::{briefing, help, small};
 use crate::control::snapshot::Snapshot;
 use crate::record::EpisodeRow;
@@ -17,13 +18,6 @@ use crate::report::metrics;
 use crate::session::Phase;
 use crate::session::machine::{Finish, Stage};
 use crate::session::plan::PhasePlan;
-
-/// What picture belongs to the plant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SceneInfo {
-    /// A cart-pole.
-    CartPole(cart_pole::Geometry),
-}
 
 /// What stays the same during a session.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +55,9 @@ pub struct Info {
     /// The action's unit, one or two characters.
     pub action_unit: String,
     /// The picture.
-    pub scene: SceneInfo,
+    pub scene: Scene,
+    /// Where the regions meet, for the map beside the picture; `None` where there is none.
+    pub regions: Option<regions::Borders>,
     /// The most receptive fields.
     pub field_cap: u32,
     /// The operator and how it is known, such as "keyboard, releases reported".
@@ -252,7 +248,9 @@ fn everything(pen: &mut Pen<'_>, view: &View<'_>) {
     strip::header(&mut pen.part(0, 0, width, 1), view);
     strip::phases(&mut pen.part(0, 1, width, 1), view);
     let rows = height - 2 - PANEL_ROWS;
-    scene(&mut pen.part(0, 2, width, rows), view);
+    let beside = map::width(view.info, width);
+    scene(&mut pen.part(0, 2, width - beside, rows), view);
+    map::draw(&mut pen.part(width - beside, 2, beside, rows), view);
     pen.rule(2 + rows);
     panels::draw(&mut pen.part(0, 3 + rows, width, PANEL_ROWS - 2), view);
     let last = height - 1;
@@ -283,9 +281,7 @@ fn scene(pen: &mut Pen<'_>, view: &View<'_>) {
     let (width, height) = (pen.width(), pen.height());
     let is_running = matches!(view.scene.stage, Stage::Running(_));
     let light = if is_running { Light::Go } else { Light::Wait };
-    let SceneInfo::CartPole(geometry) = &view.info.scene;
-    let mut picture = pen.part(0, 0, width, height - 1);
-    cart_pole::draw(&mut picture, geometry, &view.scene.state, light);
+    view.info.scene.draw(&mut pen.part(0, 0, width, height - 1), &view.scene.state, light);
     if let Stage::Hold { moment, ticks_left } = view.scene.stage {
         let info = view.info;
         let whole = if moment.phase.is_steered() { info.hold_s } else { info.autonomous_hold_s };

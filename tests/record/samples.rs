@@ -5,7 +5,8 @@ use std::path::Path;
 
 use coadapt::record::sidecar::Host;
 use coadapt::record::{
-    Checkpoint, Columns, EpisodeRow, Folder, Manner, Policy, Recorder, Sidecar, Status, StepRow, VERSION,
+    Checkpoint, Columns, EpisodeRow, Folder, Manner, Policy, Recorder, Sidecar, Status, StepRow,
+    VERSION,
 };
 use coadapt::session::{Moment, Phase, Subject, Trial};
 use coadapt::sharing::Mode;

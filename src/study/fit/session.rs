@@ -58,8 +58,8 @@ pub fn read(
     let sidecar = record::read_sidecar(&file)?;
     let profile = Document::from_text("session.json", sidecar.profile_ron.clone()).read()?;
     let mut steps = reader::Steps::open(&folder.join("steps.csv"))?;
-    let episodes = reader::Episodes::open(&folder.join("episodes.csv"))?
-        .collect::<Result<Vec<_>, _>>()?;
+    let episodes =
+        reader::Episodes::open(&folder.join("episodes.csv"))?.collect::<Result<Vec<_>, _>>()?;
     let task = profile.experiment.task(profile.tick());
     let asked = Asked::of(&*task, &profile, steps.columns(), inputs, outputs)?;
     let main: Vec<EpisodeRow> =
@@ -180,8 +180,7 @@ impl Asked {
             Place::State(index) => row.state.get(index).copied(),
         };
         let inputs: Option<Vec<f64>> = self.inputs.iter().map(input).collect();
-        let outputs: Option<Vec<f64>> =
-            self.outputs.iter().map(|name| action(row, name)).collect();
+        let outputs: Option<Vec<f64>> = self.outputs.iter().map(|name| action(row, name)).collect();
         if let (Some(x), Some(y)) = (inputs, outputs) {
             samples.push((&x, &y, 1.0), line);
         }

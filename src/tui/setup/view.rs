@@ -310,7 +310,7 @@ impl View<'_> {
                 let geometry = cart_pole::Geometry {
                     pole_length_m: plant.pole_length_m,
                     track_length_m: plant.track_length_m,
-                    fail_angle_rad: rules.fail_deg.to_radians(),
+                    fail_angle_rad: Some(rules.fail_deg.to_radians()),
                 };
                 let swing = (1.4 * self.extras.time_s + 0.5).sin();
                 let reach = plant.track_length_m.unwrap_or(1.0) / 2.0;
