@@ -30,7 +30,7 @@ pub enum Experiment {
         /// Release, failure and cap.
         rules: balance::Params,
         /// Who steers where nobody is there.
-        simulated: simulated::Params,
+        simulated: simulated::cart_pole::Params,
     },
     /// Swing the pole up and keep it there.
     SwingUp {
@@ -39,7 +39,7 @@ pub enum Experiment {
         /// Times and regions.
         rules: swing_up::Params,
         /// Who steers where nobody is there.
-        simulated: simulated::Params,
+        simulated: simulated::swing_up::Params,
     },
     /// Roll the ball as fast as possible.
     SpeedUp {
@@ -48,7 +48,7 @@ pub enum Experiment {
         /// Times, limits and scale.
         rules: speed_up::Params,
         /// Who steers where nobody is there.
-        simulated: simulated::Params,
+        simulated: simulated::ball_beam::Params,
     },
     /// Drive up to the flag.
     MountainCar {
@@ -57,7 +57,7 @@ pub enum Experiment {
         /// Start, rewards and scale.
         rules: mountain_car::Params,
         /// Who steers where nobody is there.
-        simulated: simulated::Params,
+        simulated: simulated::mountain_car::Params,
     },
 }
 

@@ -7,7 +7,7 @@ use super::session::{Company, Keys, usage};
 use crate::learner::{Learner, Model};
 use crate::operator::script::Script;
 use crate::operator::shaping::Shaping;
-use crate::operator::simulated::Simulated;
+use crate::operator::simulated::{self, Kind, Skill};
 use crate::operator::terminal::Keyboard;
 use crate::operator::{self, Choice, Operator};
 use crate::profile::{Experiment, Order, Profile};
@@ -16,6 +16,7 @@ use crate::record::{self, assignment, folder, policy};
 use crate::session::plan::Wanted;
 use crate::session::{Moment, Phase};
 use crate::sharing::Mode;
+use crate::signal::Seconds;
 
 /// The policy that the order asks for, read and fitting.
 pub(super) fn order_policy(
@@ -119,12 +120,7 @@ pub(super) fn steer(
             Box::new(Script::load(file, &phases, limit).map_err(|error| usage(&error))?)
         }
         Choice::Simulated(skill, kind) => {
-            let (Experiment::Balance { plant, simulated, .. }
-            | Experiment::SwingUp { plant, simulated, .. }) = &profile.experiment
-            else {
-                return Err(RunError::Usage("no simulated operator yet".to_owned()));
-            };
-            Box::new(Simulated::new(simulated, *skill, *kind, seed, tick, plant))
+            simulated_operator(&profile.experiment, (*skill, *kind), seed, tick)
         }
         Choice::Keyboard => match company {
             Company::Attended(Keys { hands, clock }) => {
@@ -141,4 +137,27 @@ pub(super) fn steer(
             }
         },
     })
+}
+
+/// A person who is not there, at the plant of `experiment`.
+fn simulated_operator(
+    experiment: &Experiment,
+    (skill, kind): (Skill, Kind),
+    seed: u64,
+    tick: Seconds,
+) -> Box<dyn Operator> {
+    match experiment {
+        Experiment::Balance { plant, simulated: params, .. } => {
+            Box::new(simulated::cart_pole::Balancer::new(params, skill, kind, seed, tick, plant))
+        }
+        Experiment::SwingUp { plant, simulated: params, .. } => {
+            Box::new(simulated::swing_up::Swinger::new(params, skill, kind, seed, tick, plant))
+        }
+        Experiment::SpeedUp { plant, simulated: params, .. } => {
+            Box::new(simulated::ball_beam::Roller::new(params, skill, kind, seed, tick, plant))
+        }
+        Experiment::MountainCar { plant, simulated: params, .. } => {
+            Box::new(simulated::mountain_car::Driver::new(params, skill, kind, seed, tick, plant))
+        }
+    }
 }
