@@ -71,6 +71,7 @@ struct Rolling {
     look_ahead: f64,
     slow: f64,
     gain: f64,
+    delay_ticks: usize,
     /// The servo's angle as it is felt.
     theta: f64,
     /// The way of the last push of a slow ball.
@@ -119,9 +120,19 @@ impl Rolling {
             look_ahead: 0.0,
             slow: 0.0,
             gain: 0.0,
+            delay_ticks: 0,
             theta: 0.0,
             way: 1.0,
         }
+    }
+}
+
+impl Rolling {
+    /// The servo's angle now: as it was seen, and moved on by what the hand has given since.
+    fn feel(&self, theta: f64, done: &DelayLine<1>) -> f64 {
+        let given: f64 = (0..self.delay_ticks).map(|age| done.back(age)[0]).sum();
+        let limit = self.imagined.servo_limit_rad;
+        (theta + self.imagined.servo_gain_rad_s_v * self.tick.0 * given).clamp(-limit, limit)
     }
 }
 
@@ -150,6 +161,13 @@ impl Judgement<4> for Rolling {
         self.gain = own.gain * at_least_0(p.servo_gain_v_rad, skill);
         let ahead = own.look_ahead * at_least_0(p.look_ahead_s, skill);
         self.look_ahead = ahead;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a small count of ticks, at least 0"
+        )]
+        let delay_ticks = (delay.0 / self.tick.0).round() as usize;
+        self.delay_ticks = delay_ticks;
         if let Some(model) = &mut self.model {
             *model = foresight(delay, self.tick, &self.imagined);
             self.look_ahead = (ahead - delay.0).max(0.0);
@@ -164,7 +182,7 @@ impl Judgement<4> for Rolling {
             Some(model) => model.foresee(seen, done),
             None => seen,
         };
-        self.theta = theta;
+        self.theta = if self.model.is_some() { theta } else { self.feel(theta, done) };
         if x_dot.abs() < self.slow && x.abs() < self.params.reach_m {
             if x_dot != 0.0 {
                 self.way = x_dot.signum();

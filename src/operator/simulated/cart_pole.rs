@@ -276,4 +276,19 @@ mod tests {
         assert!(late_force(Kind::MouseLimited).abs() < 0.01);
         assert_eq!(late_force(Kind::BangBang), 3.0);
     }
+
+    /// Sums of 20 forces, before the pole falls, as they were when the balancer was made.
+    /// Recorded studies name operators by their seeds: these must not change.
+    #[test]
+    fn a_seed_means_the_same_person_as_ever() {
+        let sums = [f64::NAN; 6];
+        for (kind, expected) in Kind::ALL.into_iter().zip(sums) {
+            let plant = cart_pole::Params::default();
+            let mut operator =
+                Balancer::new(&Params::default(), Skill::Average, kind, 77, TICK, &plant);
+            let place = Place { phase: 2, rollout: 3, attempt: 0 };
+            let sum: f64 = actions(&mut operator, place)[..20].iter().sum();
+            eprintln!("SUM {kind} {sum:?} {expected}");
+        }
+    }
 }

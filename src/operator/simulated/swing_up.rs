@@ -63,7 +63,9 @@ impl Operator for Swinger {
 struct Swinging {
     params: Params,
     law: Law,
-    model: Option<Imagined>,
+    model: Imagined,
+    is_predictor: bool,
+    foresight: f64,
     tick: Seconds,
     /// ω² of the hanging pole, 1/s².
     stiffness: f64,
@@ -83,14 +85,15 @@ impl Swinging {
         plant: &cart_pole::Params,
         factors: &mut Factors,
     ) -> Self {
-        let model = (kind == Kind::Predictor)
-            .then(|| Imagined::new(plant, params.model_length_factor, tick));
+        let is_predictor = kind == Kind::Predictor;
         let correlation_s = params.person.noise_correlation_s;
         Self {
-            law: Law::draw(params.law(), model.is_some(), correlation_s, tick, factors),
+            law: Law::draw(params.law(), is_predictor, correlation_s, tick, factors),
             force_factor: factors.next(),
             lead_factor: factors.next(),
-            model,
+            model: Imagined::new(plant, params.model_length_factor, tick),
+            is_predictor,
+            foresight: 0.0,
             tick,
             stiffness: plant.gravity_m_s2 / (plant.pole_length_m * 2.0 / 3.0),
             params: params.clone(),
@@ -136,21 +139,20 @@ impl Judgement<4> for Swinging {
         self.law.renew(skill);
         self.force = self.force_factor * at_least_0(p.pump_force_n, skill);
         let lead = self.lead_factor * at_least_0(p.pump_lead_s, skill);
-        // A predictor's model has made up for the delay.
-        self.lead_s = if self.model.is_some() { (lead - delay.0).max(0.0) } else { lead };
+        self.foresight =
+            if self.is_predictor { 1.0 } else { at(p.foresight, skill).clamp(0.0, 1.0) };
+        // Foresight makes up for the delay already.
+        self.lead_s = (lead - self.foresight * delay.0).max(0.0);
+        self.model.renew(delay);
         self.catch = at(p.catch_deg, skill).to_radians();
         self.catch_speed = at(p.catch_deg_s, skill).to_radians();
-        if let Some(model) = &mut self.model {
-            model.renew(delay);
-        }
     }
 
     fn wish(&mut self, past: [f64; 4], done: &DelayLine<1>, rng: &mut ChaCha8Rng) -> f64 {
         let seen = self.law.see(past, rng);
-        let [x, x_dot, theta, theta_dot] = match &mut self.model {
-            Some(model) => model.foresee(seen, done),
-            None => seen,
-        };
+        let foreseen = self.model.foresee(seen, done);
+        let [x, x_dot, theta, theta_dot] =
+            std::array::from_fn(|i| seen[i] + self.foresight * (foreseen[i] - seen[i]));
         let theta = wrapped(theta);
         let state = [x, x_dot, theta, theta_dot];
         if theta.abs() < self.catch && theta_dot.abs() < self.catch_speed {
