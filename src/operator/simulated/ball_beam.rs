@@ -20,7 +20,8 @@ use crate::signal::{Intent, Seconds};
 
 /// A simulated operator of the ball and beam; the state must be `[x, ẋ, θ, θ̇]`.
 ///
-/// A decision is an angle of the servo. The habits: `intermittent` holds it; `bang-bang`
+/// A decision is an angle of the servo. The habits: `intermittent` holds it, and looks
+/// ahead to the middle of the time for which it will; `bang-bang`
 /// knows three angles; `predictor` foresees ball and servo with a model in the head, whose
 /// look-ahead then spans only what is left of it; `mouse-limited` cannot sustain a voltage;
 /// `lapses` tilt the wrong way.
@@ -61,6 +62,8 @@ struct Rolling {
     params: Params,
     model: Option<Foresight<ball_beam::BallBeam>>,
     imagined: ball_beam::Params,
+    /// Half of the time for which a decision holds: it has to suit the middle of it.
+    half_hold: f64,
     tick: Seconds,
     x_error: Wander,
     x_dot_error: Wander,
@@ -101,9 +104,14 @@ impl Rolling {
             ..plant.clone()
         };
         let correlation_s = params.person.noise_correlation_s;
+        let (shortest, longest) = params.person.decision_hold_s;
         Self {
             model: (kind == Kind::Predictor).then(|| foresight(Seconds(0.0), tick, &imagined)),
             imagined,
+            half_hold: match kind {
+                Kind::Intermittent => f64::midpoint(shortest, longest) / 2.0,
+                _ => 0.0,
+            },
             tick,
             x_error: Wander::still(correlation_s, tick),
             x_dot_error: Wander::still(correlation_s, tick),
@@ -159,7 +167,7 @@ impl Judgement<4> for Rolling {
         self.swing = own.swing * at_least_0(p.swing_rad, skill);
         self.slow = at_least_0(p.slow_m_s, skill);
         self.gain = own.gain * at_least_0(p.servo_gain_v_rad, skill);
-        let ahead = own.look_ahead * at_least_0(p.look_ahead_s, skill);
+        let ahead = own.look_ahead * at_least_0(p.look_ahead_s, skill) + self.half_hold;
         self.look_ahead = ahead;
         #[expect(
             clippy::cast_possible_truncation,

@@ -72,8 +72,8 @@ impl Default for Params {
             x_dot_gain_n_s_m: (0.0, 0.8),
             theta_gain_trait_sd: 0.1,
             foresight: (0.0, 0.3),
-            model_length_factor: 1.5,
-            model_noise_factor: (3.0, 5.0),
+            model_length_factor: 1.2,
+            model_noise_factor: (3.0, 8.0),
         }
     }
 }
