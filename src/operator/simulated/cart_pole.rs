@@ -2,6 +2,19 @@
 //!
 //! A delayed linear law ([`Params`]), applied as the kind's habit does; practice is counted
 //! in rollouts.
+//!
+//! Measured: mean time for which they keep the balance profile's pole up, in s, of the first
+//! and the last ten of 100 rollouts after 20 of practice, 20 operators each. The predictor's
+//! noise is set so that it is about as good as the delayed PD law.
+//!
+//! | kind | naive | average | expert |
+//! | --- | --- | --- | --- |
+//! | delayed-pd | 1.4, 2.2 | 2.0, 2.9 | 4.6, 5.5 |
+//! | intermittent | 1.1, 1.2 | 1.2, 1.3 | 1.5, 1.5 |
+//! | bang-bang | 1.2, 1.2 | 1.2, 1.3 | 1.5, 1.5 |
+//! | predictor | 1.4, 2.4 | 1.9, 3.2 | 4.3, 5.0 |
+//! | mouse-limited | 1.1, 1.2 | 1.2, 1.3 | 1.6, 1.6 |
+//! | lapses | 1.2, 1.6 | 1.4, 1.8 | 2.7, 2.7 |
 
 mod params;
 

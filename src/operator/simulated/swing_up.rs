@@ -5,6 +5,26 @@
 //! 2000, "Swinging up a pendulum by energy control"). The rhythm of the swing lets people
 //! anticipate, better with practice. Near the top the pole is balanced by the same late
 //! linear law as in the balance task.
+//!
+//! People foresee some of what their own pushes did since they saw the pole, with a model in
+//! the head (Mehta & Schaal 2002, "Forward models in visuomotor control"): by late feedback
+//! alone nobody could hold a pole of 0.6 m for more than about two seconds. The values are
+//! ours, set so that an expert is up within a few seconds and holds the top for some, an
+//! average person reaches it regularly and holds it for about one, and a naive one has to
+//! find the swing's rhythm first.
+//!
+//! Measured: mean height cos θ, and mean time of holds within 30° of upright (of 0.3 s or
+//! longer) in s, in two minutes from hanging at rest after 180 s and after 1180 s of practice,
+//! 20 operators each, with a pole of 0.6 m.
+//!
+//! | kind | naive | average | expert |
+//! | --- | --- | --- | --- |
+//! | delayed-pd | −0.08, 0.36; 0.5, 0.9 | 0.36, 0.50; 0.9, 1.2 | 0.65, 0.65; 2.9, 2.9 |
+//! | intermittent | −0.19, 0.03; 0.4, 0.6 | 0.07, 0.18; 0.6, 0.6 | 0.22, 0.22; 0.5, 0.5 |
+//! | bang-bang | −0.14, 0.30; 0.3, 0.6 | 0.33, 0.41; 0.6, 0.7 | 0.50, 0.50; 1.0, 1.0 |
+//! | predictor | 0.10, 0.16; 0.6, 0.6 | 0.17, 0.21; 0.6, 0.7 | 0.31, 0.31; 1.7, 1.7 |
+//! | mouse-limited | −0.06, 0.29; 0.6, 0.9 | 0.30, 0.36; 0.9, 1.0 | 0.22, 0.22; 1.2, 1.2 |
+//! | lapses | −0.16, 0.24; 0.6, 0.7 | 0.26, 0.36; 0.8, 0.9 | 0.42, 0.42; 1.4, 1.4 |
 
 mod params;
 

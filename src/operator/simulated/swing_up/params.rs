@@ -71,7 +71,7 @@ impl Default for Params {
             x_gain_n_m: (0.0, 1.2),
             x_dot_gain_n_s_m: (0.0, 0.8),
             theta_gain_trait_sd: 0.1,
-            foresight: (0.0, 0.3),
+            foresight: (0.0, 0.33),
             model_length_factor: 1.2,
             model_noise_factor: (3.0, 8.0),
         }
