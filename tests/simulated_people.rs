@@ -273,9 +273,12 @@ fn everyone(kind: Kind, seed: u64) -> Vec<(Box<dyn Operator>, f64, Vec<f64>)> {
         plant::ball_beam::Params { voltage_limit_v: 1.0, ..Default::default() },
         plant::mountain_car::Params { throttle_limit: 0.5, ..Default::default() },
     );
-    let swinger = swing_up::Swinger::new(&Default::default(), skill, kind, seed, TICK, &pole);
-    let roller = ball_beam::Roller::new(&Default::default(), skill, kind, seed, TICK, &ball);
-    let driver = mountain_car::Driver::new(&Default::default(), skill, kind, seed, TICK, &car);
+    let swinger =
+        swing_up::Swinger::new(&swing_up::Params::default(), skill, kind, seed, TICK, &pole);
+    let roller =
+        ball_beam::Roller::new(&ball_beam::Params::default(), skill, kind, seed, TICK, &ball);
+    let driver =
+        mountain_car::Driver::new(&mountain_car::Params::default(), skill, kind, seed, TICK, &car);
     vec![
         (Box::new(swinger), 2.0, vec![0.0, 0.0, 3.0, 0.0]),
         (Box::new(roller), 1.0, vec![0.0; 4]),
