@@ -34,7 +34,7 @@ enum Entry {
     /// or received this.
     Applied(f64),
     /// The operator began, after so many rollouts and ticks,
-    Begun(u32, u32),
+    Begun(u32, f64),
     /// the witness was told of something, a word,
     Told(&'static str),
     /// or was given the policy of a tenth, %.
@@ -108,7 +108,7 @@ impl Operator for Pusher {
         self.push = PUSH * f64::from(1 + place.attempt);
         let ticks = practice.time.0 / 0.02;
         assert!((ticks - ticks.round()).abs() < 1e-9, "{practice:?}");
-        self.diary.note(Entry::Begun(practice.rollouts, ticks.round() as u32));
+        self.diary.note(Entry::Begun(practice.rollouts, ticks.round()));
     }
 
     fn intent(&mut self, _view: View<'_>) -> Intent {
@@ -270,7 +270,7 @@ fn policies(entries: &[Entry]) -> Vec<u8> {
         .collect()
 }
 
-fn begun(entries: &[Entry]) -> Vec<(u32, u32)> {
+fn begun(entries: &[Entry]) -> Vec<(u32, f64)> {
     entries
         .iter()
         .filter_map(|entry| match entry {
@@ -288,9 +288,9 @@ fn practice_counts_what_was_steered_but_not_what_was_discarded() {
     session.ask(Command::Discard);
     session.tick(1);
     let diary = session.diary.clone();
-    assert_eq!(begun(&diary.take()), [(0, 0), (1, 6), (1, 6)]);
+    assert_eq!(begun(&diary.take()), [(0, 0.0), (1, 6.0), (1, 6.0)]);
     session.finish();
-    assert_eq!(begun(&diary.take())[..3], [(2, 12), (3, 18), (4, 24)]);
+    assert_eq!(begun(&diary.take())[..3], [(2, 12.0), (3, 18.0), (4, 24.0)]);
 }
 
 #[test]
@@ -300,7 +300,7 @@ fn practice_goes_on_in_a_resumed_session() {
     let diary = session.diary.clone();
     let outcome = session.finish();
     let whole = begun(&diary.take());
-    assert_eq!(whole[..5], [(0, 0), (1, 6), (2, 12), (3, 18), (4, 24)]);
+    assert_eq!(whole[..5], [(0, 0.0), (1, 6.0), (2, 12.0), (3, 18.0), (4, 24.0)]);
     let standing = outcome.witness.standings[4].clone();
     let earlier = outcome.episodes[..4].to_vec();
     let resumed = Session::at_speed(0.0, &profile, false, None, Some((standing, earlier)));
