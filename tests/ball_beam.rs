@@ -1,7 +1,5 @@
 //! The ball and beam against its equations' solutions.
 
-#![expect(clippy::panic, reason = "a test fails by panicking, helpers too")]
-
 use coadapt::plant::Plant;
 use coadapt::plant::ball_beam::{BallBeam, Params};
 use coadapt::signal::{Action, Seconds, State};

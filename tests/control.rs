@@ -33,7 +33,9 @@ enum Entry {
     Halt,
     /// or received this.
     Applied(f64),
-    /// The witness was told of something, a word,
+    /// The operator began, after so many rollouts and ticks,
+    Begun(u32, f64),
+    /// the witness was told of something, a word,
     Told(&'static str),
     /// or was given the policy of a tenth, %.
     Policy(u8),
@@ -98,15 +100,21 @@ impl Backend for Rest {
 }
 
 /// Pushes to the right, and more so in a repeated rollout.
-struct Pusher(f64);
+struct Pusher {
+    push: f64,
+    diary: Diary,
+}
 
 impl Operator for Pusher {
-    fn begin(&mut self, place: Place, _practice: Practice) {
-        self.0 = PUSH * f64::from(1 + place.attempt);
+    fn begin(&mut self, place: Place, practice: Practice) {
+        self.push = PUSH * f64::from(1 + place.attempt);
+        let ticks = practice.time.0 / 0.02;
+        assert!((ticks - ticks.round()).abs() < 1e-9, "{practice:?}");
+        self.diary.note(Entry::Begun(practice.rollouts, ticks.round()));
     }
 
     fn intent(&mut self, _view: View<'_>) -> Intent {
-        Intent::fresh(self.0)
+        Intent::fresh(self.push)
     }
 }
 
@@ -116,6 +124,8 @@ struct Notary {
     policies: Vec<(u8, Model)>,
     learned: u64,
     refused: u64,
+    /// Where the session stood at the beginning of each rollout.
+    standings: Vec<Standing>,
 }
 
 impl Witness for Notary {
@@ -131,6 +141,7 @@ impl Witness for Notary {
     }
     fn standing(&mut self, standing: Standing) {
         (self.learned, self.refused) = (standing.learned, standing.refused);
+        self.standings.push(standing);
         self.diary.note(Entry::Told("standing"));
     }
     fn policy(&mut self, percent: Option<u8>, learner: &Model) {
@@ -175,10 +186,16 @@ fn profile(phases: &str) -> Profile {
 
 impl Session {
     fn new(profile: &Profile, attended: bool, lost: Option<Lost>) -> Self {
-        Self::at_speed(0.0, profile, attended, lost)
+        Self::at_speed(0.0, profile, attended, lost, None)
     }
 
-    fn at_speed(speed: f64, profile: &Profile, attended: bool, lost: Option<Lost>) -> Self {
+    fn at_speed(
+        speed: f64,
+        profile: &Profile,
+        attended: bool,
+        lost: Option<Lost>,
+        from: Option<(Standing, Vec<EpisodeRow>)>,
+    ) -> Self {
         let (tick, seed) = (profile.tick(), 1);
         let diary = Diary::default();
         let plan = Plan::new(&profile.session, tick, seed, attended);
@@ -199,11 +216,17 @@ impl Session {
         let crew = Crew {
             task: profile.experiment.task(tick),
             backend: Safe::new(Box::new(plant), limits),
-            operator: Box::new(Pusher(PUSH)),
-            witness: Notary { diary: diary.clone(), policies: Vec::new(), learned: 0, refused: 0 },
+            operator: Box::new(Pusher { push: PUSH, diary: diary.clone() }),
+            witness: Notary {
+                diary: diary.clone(),
+                policies: Vec::new(),
+                learned: 0,
+                refused: 0,
+                standings: Vec::new(),
+            },
             publisher: Some(publisher),
         };
-        let cycle = Cycle::new(rules, crew, fresh, None);
+        let cycle = Cycle::new(rules, crew, fresh, from);
         let clock = VirtualClock::default();
         let pacer = Pacer::new(&clock);
         Self { cycle, clock, pacer, watcher, diary }
@@ -249,12 +272,51 @@ fn policies(entries: &[Entry]) -> Vec<u8> {
         .collect()
 }
 
+fn begun(entries: &[Entry]) -> Vec<(u32, f64)> {
+    entries
+        .iter()
+        .filter_map(|entry| match entry {
+            Entry::Begun(rollouts, ticks) => Some((*rollouts, *ticks)),
+            _ => None,
+        })
+        .collect()
+}
+
+#[test]
+fn practice_counts_what_was_steered_but_not_what_was_discarded() {
+    let mut session = Session::new(&profile("main"), true, None);
+    session.ask(Command::Begin);
+    session.tick(TICKS + 2);
+    session.ask(Command::Discard);
+    session.tick(1);
+    let diary = session.diary.clone();
+    assert_eq!(begun(&diary.take()), [(0, 0.0), (1, 6.0), (1, 6.0)]);
+    session.finish();
+    assert_eq!(begun(&diary.take())[..3], [(2, 12.0), (3, 18.0), (4, 24.0)]);
+}
+
+#[test]
+fn practice_goes_on_in_a_resumed_session() {
+    let profile = profile("introduction, main");
+    let session = Session::new(&profile, false, None);
+    let diary = session.diary.clone();
+    let outcome = session.finish();
+    let whole = begun(&diary.take());
+    assert_eq!(whole[..5], [(0, 0.0), (1, 6.0), (2, 12.0), (3, 18.0), (4, 24.0)]);
+    let standing = outcome.witness.standings[4].clone();
+    let earlier = outcome.episodes[..4].to_vec();
+    let resumed = Session::at_speed(0.0, &profile, false, None, Some((standing, earlier)));
+    let diary = resumed.diary.clone();
+    resumed.finish();
+    assert_eq!(begun(&diary.take()), whole[4..]);
+}
+
 #[test]
 fn samples_that_the_learner_refuses_are_told_once_a_rollout() {
     // Divided by its norm, 1 m/s, this speed is a number; divided by a smaller one it is not.
     let mut profile = profile("introduction, main");
     profile.learner.norm_in = vec![1e-6; 4];
-    let session = Session::at_speed(1e305, &profile, false, None);
+    let session = Session::at_speed(1e305, &profile, false, None, None);
     let diary = session.diary.clone();
     let outcome = session.finish();
     assert_eq!((outcome.learned, outcome.refused), (0, 50));

@@ -3,18 +3,9 @@
 //! They stand in for subjects in headless sessions and studies. They do not tire, do not
 //! adapt to the robot's share and do not exploit its help; a person would.
 //!
-//! Measured: mean time for which they keep the balance profile's pole up, in s, of the first
-//! and the last ten of 100 rollouts after 20 of practice, 20 operators each. The predictor's
-//! noise is set so that it is about as good as the delayed PD law.
-//!
-//! | kind | naive | average | expert |
-//! | --- | --- | --- | --- |
-//! | delayed-pd | 1.4, 2.2 | 2.0, 2.9 | 4.6, 5.5 |
-//! | intermittent | 1.1, 1.2 | 1.2, 1.3 | 1.5, 1.5 |
-//! | bang-bang | 1.2, 1.2 | 1.2, 1.3 | 1.5, 1.5 |
-//! | predictor | 1.4, 2.4 | 1.9, 3.2 | 4.3, 5.0 |
-//! | mouse-limited | 1.1, 1.2 | 1.2, 1.3 | 1.6, 1.6 |
-//! | lapses | 1.2, 1.6 | 1.4, 1.8 | 2.7, 2.7 |
+//! One file a task: [`cart_pole`] (balance), [`swing_up`], [`ball_beam`], [`mountain_car`].
+//! They share the [`person`] (delay, hand, habits, practice) and differ in judgement; each
+//! file says how well its people do and what the habits mean there.
 
 pub mod ball_beam;
 pub mod cart_pole;

@@ -2,6 +2,19 @@
 //!
 //! A delayed linear law ([`Params`]), applied as the kind's habit does; practice is counted
 //! in rollouts.
+//!
+//! Measured: mean time for which they keep the balance profile's pole up, in s, of the first
+//! and the last ten of 100 rollouts after 20 of practice, 20 operators each. The predictor's
+//! noise is set so that it is about as good as the delayed PD law.
+//!
+//! | kind | naive | average | expert |
+//! | --- | --- | --- | --- |
+//! | delayed-pd | 1.4, 2.2 | 2.0, 2.9 | 4.6, 5.5 |
+//! | intermittent | 1.1, 1.2 | 1.2, 1.3 | 1.5, 1.5 |
+//! | bang-bang | 1.2, 1.2 | 1.2, 1.3 | 1.5, 1.5 |
+//! | predictor | 1.4, 2.4 | 1.9, 3.2 | 4.3, 5.0 |
+//! | mouse-limited | 1.1, 1.2 | 1.2, 1.3 | 1.6, 1.6 |
+//! | lapses | 1.2, 1.6 | 1.4, 1.8 | 2.7, 2.7 |
 
 mod params;
 
@@ -275,5 +288,27 @@ mod tests {
         assert!(late_force(Kind::DelayedPd) > 2.0);
         assert!(late_force(Kind::MouseLimited).abs() < 0.01);
         assert_eq!(late_force(Kind::BangBang), 3.0);
+    }
+
+    /// Sums of 20 forces, before the pole falls, as they were when the balancer was made.
+    /// Recorded studies name operators by their seeds: these must not change.
+    #[test]
+    fn a_seed_means_the_same_person_as_ever() {
+        let sums = [
+            -7.995852995262981,
+            3.234024902973185,
+            -6.012307011761041,
+            -22.44647649629869,
+            -6.207451387938783,
+            2.379105961641257,
+        ];
+        for (kind, expected) in Kind::ALL.into_iter().zip(sums) {
+            let plant = cart_pole::Params::default();
+            let mut operator =
+                Balancer::new(&Params::default(), Skill::Average, kind, 77, TICK, &plant);
+            let place = Place { phase: 2, rollout: 3, attempt: 0 };
+            let sum: f64 = actions(&mut operator, place)[..20].iter().sum();
+            assert!((sum - expected).abs() < 1e-9, "{kind}: {sum:?}");
+        }
     }
 }

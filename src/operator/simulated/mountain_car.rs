@@ -4,6 +4,18 @@
 //! within 10 % of the fastest way (113 steps of eq. 30–31 against 104 from x = −0.7). The
 //! velocity is seen late and blurred; a feeling for the slope makes up for some of it. Now
 //! and then the throttle is let go for a moment.
+//!
+//! Measured: mean steps from (−0.7, 0) to the flag, 500 at most, in the ten drives after
+//! 180 s and after 1180 s of practice, 20 operators each, with steps of 40 ms.
+//!
+//! | kind | naive | average | expert |
+//! | --- | --- | --- | --- |
+//! | delayed-pd | 191, 142 | 142, 126 | 114, 114 |
+//! | intermittent | 210, 157 | 155, 131 | 118, 118 |
+//! | bang-bang | 228, 180 | 184, 152 | 123, 123 |
+//! | predictor | 174, 137 | 137, 124 | 113, 113 |
+//! | mouse-limited | 221, 181 | 183, 149 | 118, 118 |
+//! | lapses | 274, 194 | 200, 154 | 119, 119 |
 
 mod params;
 

@@ -300,3 +300,100 @@ impl<const N: usize, J: Judgement<N>> Person<N, J> {
         kept.clamp(-self.character.limit, self.character.limit)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::operator::simulated::{Skill, cart_pole};
+    use crate::signal::State;
+
+    const TICK: Seconds = Seconds(0.02);
+
+    /// Wishes for its skill, so that a noiseless hand shows it.
+    struct Mirror(f64);
+
+    impl Judgement<1> for Mirror {
+        fn begin(&mut self, _rng: &mut ChaCha8Rng) {}
+
+        fn renew(&mut self, skill: f64, _delay: Seconds) {
+            self.0 = skill;
+        }
+
+        fn wish(&mut self, _: [f64; 1], _: &DelayLine<1>, _: &mut ChaCha8Rng) -> f64 {
+            self.0
+        }
+    }
+
+    fn calm() -> Params {
+        Params {
+            motor_noise_fraction: (0.0, 0.0),
+            motor_noise: (0.0, 0.0),
+            lag_s: 0.0,
+            skill_last_sd: (0.0, 0.0, 0.0),
+            ..Params::default()
+        }
+    }
+
+    fn mirror(character: Character) -> Person<1, Mirror> {
+        Person::new(character, Kind::DelayedPd, 1, TICK, |_| Mirror(0.0))
+    }
+
+    fn shown_at(person: &mut Person<1, Mirror>, rollout_time: f64) -> f64 {
+        let state = State::new([0.0]);
+        let rollout_time = Seconds(rollout_time);
+        person.intent(View { state: &state, now: rollout_time, rollout_time }).action().0
+    }
+
+    #[test]
+    fn skill_grows_with_steered_time_within_a_rollout_and_over_rollouts() {
+        let params = calm();
+        let mut person = mirror(params.character(Skill::Naive, 1.0, 10.0));
+        let skill = |t: f64| 0.7 + (0.05 - 0.7) * (-t / params.practice_s).exp();
+        person.begin(Place::default(), Practice { rollouts: 3, time: Seconds(100.0) });
+        for (rollout_time, counts) in
+            [(-3.0, 100.0), (0.0, 100.0), (0.98, 100.0), (1.0, 101.0), (57.5, 157.0)]
+        {
+            let shown = shown_at(&mut person, rollout_time);
+            assert!((shown - skill(counts)).abs() < 1e-12, "{rollout_time}: {shown}");
+        }
+        // The next rollout goes on from the practice it is told of, not from memory.
+        person.begin(Place::default(), Practice { rollouts: 4, time: Seconds(100.0) });
+        assert!((shown_at(&mut person, 0.0) - skill(100.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn skill_by_rollouts_is_constant_within_them() {
+        let params = cart_pole::Params {
+            motor_noise_fraction: (0.0, 0.0),
+            motor_noise_n: (0.0, 0.0),
+            lag_s: 0.0,
+            skill_last_sd: (0.0, 0.0, 0.0),
+            ..cart_pole::Params::default()
+        };
+        let mut person = mirror(params.character(Skill::Naive, 10.0));
+        for (rollouts, left) in [(0, 1.0), (40, (-1.0_f64).exp())] {
+            person.begin(Place::default(), Practice { rollouts, time: Seconds(1e4) });
+            for rollout_time in [0.0, 500.0] {
+                let shown = shown_at(&mut person, rollout_time);
+                assert!((shown - (0.7 - 0.65 * left)).abs() < 1e-12, "{rollouts}: {shown}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_expert_has_nothing_to_learn() {
+        let mut person = mirror(calm().character(Skill::Expert, 1.0, 10.0));
+        for time in [0.0, 1e6] {
+            person.begin(Place::default(), Practice { rollouts: 0, time: Seconds(time) });
+            assert!((shown_at(&mut person, 0.0) - 1.2).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_defaults_pass() {
+        use crate::check::{Check, Checker};
+        let mut faults = Vec::new();
+        Params::default().check(&mut Checker::new(&mut faults));
+        assert_eq!(faults, []);
+    }
+}

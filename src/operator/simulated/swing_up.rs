@@ -5,6 +5,26 @@
 //! 2000, "Swinging up a pendulum by energy control"). The rhythm of the swing lets people
 //! anticipate, better with practice. Near the top the pole is balanced by the same late
 //! linear law as in the balance task.
+//!
+//! People foresee some of what their own pushes did since they saw the pole, with a model in
+//! the head (Mehta & Schaal 2002, "Forward models in visuomotor control"): by late feedback
+//! alone nobody could hold a pole of 0.6 m for more than about two seconds. The values are
+//! ours, set so that an expert is up within a few seconds and holds the top for some, an
+//! average person reaches it regularly and holds it for about one, and a naive one has to
+//! find the swing's rhythm first.
+//!
+//! Measured: mean height cos θ, and mean time of holds within 30° of upright (of 0.3 s or
+//! longer) in s, in two minutes from hanging at rest after 180 s and after 1180 s of practice,
+//! 20 operators each, with a pole of 0.6 m.
+//!
+//! | kind | naive | average | expert |
+//! | --- | --- | --- | --- |
+//! | delayed-pd | −0.08, 0.36; 0.5, 0.9 | 0.36, 0.50; 0.9, 1.2 | 0.65, 0.65; 2.9, 2.9 |
+//! | intermittent | −0.19, 0.03; 0.4, 0.6 | 0.07, 0.18; 0.6, 0.6 | 0.22, 0.22; 0.5, 0.5 |
+//! | bang-bang | −0.14, 0.30; 0.3, 0.6 | 0.33, 0.41; 0.6, 0.7 | 0.50, 0.50; 1.0, 1.0 |
+//! | predictor | 0.10, 0.16; 0.6, 0.6 | 0.17, 0.21; 0.6, 0.7 | 0.31, 0.31; 1.7, 1.7 |
+//! | mouse-limited | −0.06, 0.30; 0.6, 0.9 | 0.31, 0.38; 0.9, 1.0 | 0.19, 0.19; 1.2, 1.2 |
+//! | lapses | −0.18, 0.24; 0.6, 0.7 | 0.24, 0.38; 0.8, 0.9 | 0.45, 0.45; 1.4, 1.4 |
 
 mod params;
 
@@ -63,7 +83,9 @@ impl Operator for Swinger {
 struct Swinging {
     params: Params,
     law: Law,
-    model: Option<Imagined>,
+    model: Imagined,
+    is_predictor: bool,
+    foresight: f64,
     tick: Seconds,
     /// ω² of the hanging pole, 1/s².
     stiffness: f64,
@@ -83,14 +105,15 @@ impl Swinging {
         plant: &cart_pole::Params,
         factors: &mut Factors,
     ) -> Self {
-        let model = (kind == Kind::Predictor)
-            .then(|| Imagined::new(plant, params.model_length_factor, tick));
+        let is_predictor = kind == Kind::Predictor;
         let correlation_s = params.person.noise_correlation_s;
         Self {
-            law: Law::draw(params.law(), model.is_some(), correlation_s, tick, factors),
+            law: Law::draw(params.law(), is_predictor, correlation_s, tick, factors),
             force_factor: factors.next(),
             lead_factor: factors.next(),
-            model,
+            model: Imagined::new(plant, params.model_length_factor, tick),
+            is_predictor,
+            foresight: 0.0,
             tick,
             stiffness: plant.gravity_m_s2 / (plant.pole_length_m * 2.0 / 3.0),
             params: params.clone(),
@@ -136,21 +159,20 @@ impl Judgement<4> for Swinging {
         self.law.renew(skill);
         self.force = self.force_factor * at_least_0(p.pump_force_n, skill);
         let lead = self.lead_factor * at_least_0(p.pump_lead_s, skill);
-        // A predictor's model has made up for the delay.
-        self.lead_s = if self.model.is_some() { (lead - delay.0).max(0.0) } else { lead };
+        self.foresight =
+            if self.is_predictor { 1.0 } else { at(p.foresight, skill).clamp(0.0, 1.0) };
+        // Foresight makes up for the delay already.
+        self.lead_s = (lead - self.foresight * delay.0).max(0.0);
+        self.model.renew(delay);
         self.catch = at(p.catch_deg, skill).to_radians();
         self.catch_speed = at(p.catch_deg_s, skill).to_radians();
-        if let Some(model) = &mut self.model {
-            model.renew(delay);
-        }
     }
 
     fn wish(&mut self, past: [f64; 4], done: &DelayLine<1>, rng: &mut ChaCha8Rng) -> f64 {
         let seen = self.law.see(past, rng);
-        let [x, x_dot, theta, theta_dot] = match &mut self.model {
-            Some(model) => model.foresee(seen, done),
-            None => seen,
-        };
+        let foreseen = self.model.foresee(seen, done);
+        let [x, x_dot, theta, theta_dot] =
+            std::array::from_fn(|i| seen[i] + self.foresight * (foreseen[i] - seen[i]));
         let theta = wrapped(theta);
         let state = [x, x_dot, theta, theta_dot];
         if theta.abs() < self.catch && theta_dot.abs() < self.catch_speed {

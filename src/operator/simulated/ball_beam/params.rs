@@ -35,14 +35,14 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             person: person::Params::default(),
-            swing_rad: (0.4, 0.8),
-            look_ahead_s: (0.25, 0.35),
-            look_ahead_trait_sd: 0.1,
-            reach_m: 0.1,
-            slow_m_s: (0.03, 0.03),
-            servo_gain_v_rad: (1.0, 2.0),
-            x_noise_m: (0.008, 0.004),
-            x_dot_noise_m_s: (0.04, 0.02),
+            swing_rad: (0.6, 1.2),
+            look_ahead_s: (0.58, 0.52),
+            look_ahead_trait_sd: 0.05,
+            reach_m: 0.04,
+            slow_m_s: (0.02, 0.08),
+            servo_gain_v_rad: (4.0, 5.0),
+            x_noise_m: (0.015, 0.003),
+            x_dot_noise_m_s: (0.06, 0.015),
             model_gain_factor: 0.7,
         }
     }
@@ -63,5 +63,29 @@ impl Check for Params {
             ("x_dot_noise_m_s", self.x_dot_noise_m_s, 0.0..=10.0),
         ];
         growth::check_pairs(c, pairs);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_pass_and_every_fault_is_named() {
+        let mut faults = Vec::new();
+        Params::default().check(&mut Checker::new(&mut faults));
+        assert_eq!(faults, []);
+        let person = person::Params { delay_s: (0.2, -1.0), ..person::Params::default() };
+        let wrong = Params { person, reach_m: -1.0, swing_rad: (0.5, 4.0), ..Params::default() };
+        wrong.check(&mut Checker::new(&mut faults));
+        let keys: Vec<&str> = faults.iter().map(|fault| &fault.key[..]).collect();
+        assert_eq!(keys, ["person.delay_s", "reach_m", "swing_rad"]);
+    }
+
+    #[test]
+    fn the_parameters_survive_ron() {
+        let text = ron::to_string(&Params::default()).unwrap();
+        assert_eq!(ron::from_str::<Params>(&text).unwrap(), Params::default());
+        assert!(ron::from_str::<Params>("(person: (delay: 0.2))").is_err());
     }
 }

@@ -31,10 +31,10 @@ impl Default for Params {
         Self {
             person: person::Params::default(),
             throttle: (0.8, 1.0),
-            lead_s: (0.0, 0.25),
-            v_noise: (0.01, 0.004),
-            v_rest: (0.006, 0.002),
-            pauses_per_s: (0.5, 0.1),
+            lead_s: (0.0, 0.2),
+            v_noise: (0.02, 0.005),
+            v_rest: (0.012, 0.002),
+            pauses_per_s: (1.5, 0.2),
             pause_s: 0.3,
         }
     }
@@ -52,5 +52,29 @@ impl Check for Params {
             ("pauses_per_s", self.pauses_per_s, 0.0..=100.0),
         ];
         growth::check_pairs(c, pairs);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_pass_and_every_fault_is_named() {
+        let mut faults = Vec::new();
+        Params::default().check(&mut Checker::new(&mut faults));
+        assert_eq!(faults, []);
+        let person = person::Params { delay_s: (0.2, -1.0), ..person::Params::default() };
+        let wrong = Params { person, pause_s: f64::NAN, throttle: (0.5, 1.5), ..Params::default() };
+        wrong.check(&mut Checker::new(&mut faults));
+        let keys: Vec<&str> = faults.iter().map(|fault| &fault.key[..]).collect();
+        assert_eq!(keys, ["person.delay_s", "pause_s", "throttle"]);
+    }
+
+    #[test]
+    fn the_parameters_survive_ron() {
+        let text = ron::to_string(&Params::default()).unwrap();
+        assert_eq!(ron::from_str::<Params>(&text).unwrap(), Params::default());
+        assert!(ron::from_str::<Params>("(person: (delay: 0.2))").is_err());
     }
 }

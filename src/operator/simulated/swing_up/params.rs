@@ -14,7 +14,7 @@ pub struct Params {
     pub person: person::Params,
     /// The force of a full push while pumping, N.
     pub pump_force_n: BySkill,
-    /// How far ahead the swing's rhythm is anticipated while pumping, s.
+    /// How far ahead the swing's rhythm is anticipated while pumping, s; below 0 it is not.
     pub pump_lead_s: BySkill,
     /// Pushes fade as the pole's energy nears that of rest at the top: within this distance,
     /// in parts of the energy from the middle height to the top.
@@ -43,7 +43,10 @@ pub struct Params {
     pub x_dot_gain_n_s_m: BySkill,
     /// Standard deviation of the logarithm of the personal factor on `theta_gain_n_rad`.
     pub theta_gain_trait_sd: f64,
-    /// `predictor`: the pole's length in the operator's head, as a factor on the true one.
+    /// How much of what happened since the state was seen, own pushes included, the operator
+    /// foresees with a model in the head; a `predictor` all of it, 1.
+    pub foresight: BySkill,
+    /// The pole's length in this model, as a factor on the true one.
     pub model_length_factor: f64,
     /// `predictor`: factor on what it misperceives of the angle and its velocity.
     pub model_noise_factor: BySkill,
@@ -53,23 +56,24 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             person: person::Params::default(),
-            pump_force_n: (4.0, 5.0),
-            pump_lead_s: (0.05, 0.25),
+            pump_force_n: (1.5, 5.0),
+            pump_lead_s: (-0.08, 0.25),
             energy_band: 0.3,
             pump_x_gain_n_m: 4.0,
             pump_x_dot_gain_n_s_m: 1.0,
-            catch_deg: (25.0, 35.0),
+            catch_deg: (15.0, 35.0),
             catch_deg_s: (250.0, 250.0),
-            theta_noise_deg: (0.6, 0.4),
-            theta_dot_noise_deg_s: (8.0, 5.0),
+            theta_noise_deg: (2.0, 0.6),
+            theta_dot_noise_deg_s: (20.0, 6.0),
             dead_zone_deg: (2.0, 1.0),
-            theta_gain_n_rad: (16.0, 14.0),
-            theta_dot_gain_n_s_rad: (2.0, 3.5),
-            x_gain_n_m: (0.0, 1.6),
-            x_dot_gain_n_s_m: (0.0, 1.5),
+            theta_gain_n_rad: (18.0, 16.0),
+            theta_dot_gain_n_s_rad: (2.0, 3.7),
+            x_gain_n_m: (0.0, 1.2),
+            x_dot_gain_n_s_m: (0.0, 0.8),
             theta_gain_trait_sd: 0.1,
+            foresight: (0.0, 0.33),
             model_length_factor: 1.2,
-            model_noise_factor: (2.0, 2.0),
+            model_noise_factor: (3.0, 8.0),
         }
     }
 }
@@ -100,8 +104,9 @@ impl Check for Params {
         c.range("theta_gain_trait_sd", self.theta_gain_trait_sd, 0.0..=1.0);
         c.range("model_length_factor", self.model_length_factor, 0.1..=10.0);
         let pairs = [
+            ("foresight", self.foresight, 0.0..=1.0),
             ("pump_force_n", self.pump_force_n, 0.0..=1000.0),
-            ("pump_lead_s", self.pump_lead_s, 0.0..=2.0),
+            ("pump_lead_s", self.pump_lead_s, -1.0..=1.0),
             ("catch_deg", self.catch_deg, 0.0..=90.0),
             ("catch_deg_s", self.catch_deg_s, 0.0..=3600.0),
             ("theta_noise_deg", self.theta_noise_deg, 0.0..=45.0),
@@ -114,5 +119,30 @@ impl Check for Params {
             ("model_noise_factor", self.model_noise_factor, 0.0..=100.0),
         ];
         growth::check_pairs(c, pairs);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_pass_and_every_fault_is_named() {
+        let mut faults = Vec::new();
+        Params::default().check(&mut Checker::new(&mut faults));
+        assert_eq!(faults, []);
+        let person = person::Params { delay_s: (0.2, -1.0), ..person::Params::default() };
+        let wrong =
+            Params { person, energy_band: 0.0, catch_deg: (10.0, 91.0), ..Params::default() };
+        wrong.check(&mut Checker::new(&mut faults));
+        let keys: Vec<&str> = faults.iter().map(|fault| &fault.key[..]).collect();
+        assert_eq!(keys, ["person.delay_s", "energy_band", "catch_deg"]);
+    }
+
+    #[test]
+    fn the_parameters_survive_ron() {
+        let text = ron::to_string(&Params::default()).unwrap();
+        assert_eq!(ron::from_str::<Params>(&text).unwrap(), Params::default());
+        assert!(ron::from_str::<Params>("(person: (delay: 0.2))").is_err());
     }
 }
