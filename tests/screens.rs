@@ -348,6 +348,8 @@ fn results() -> results::Info {
             .collect(),
         summary: vec!["gate opened at step 2413, τ 2633 steps, final share 14 %".to_owned()],
         evaluation: Some((1..=10).map(|k| (k * 10, 1.4 * f64::from(k))).collect()),
+        measure: results::Measure::BALANCE_TIME,
+        start: Some(results::Start::RELEASE),
     }
 }
 
@@ -371,6 +373,22 @@ fn pages_of_results() {
     insta::assert_snapshot!("results_empty", empty);
     state.look.glyphs = Glyphs::Ascii;
     assert!(results_picture(120, 40, &info, &state).is_ascii());
+}
+
+#[test]
+fn results_of_another_measure() {
+    let mut info = results();
+    for row in &mut info.rollouts {
+        row.mean_reward = (row.duration_s / 6.0 - 1.0).min(0.97);
+    }
+    info.measure = results::Measure::MEAN_HEIGHT;
+    info.start = None;
+    info.evaluation = None;
+    let mut state = results::State::default();
+    insta::assert_snapshot!("results_height_0", results_picture(80, 24, &info, &state));
+    state.next();
+    state.next();
+    insta::assert_snapshot!("results_height_2", results_picture(80, 24, &info, &state));
 }
 
 /// What a terminal receives in `frames` frames of a balancing swing: 30 frames a second,
