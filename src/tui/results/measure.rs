@@ -51,10 +51,10 @@ impl Measure {
         value: |row| row.mean_reward,
     };
 
-    /// Speed-up: how fast the ball was.
-    pub const MEAN_SPEED: Self = Self {
+    /// Speed-up: the ball's speed less what hits cost (eq. 27).
+    pub const REWARDED_SPEED: Self = Self {
         page: "speed",
-        name: "mean speed",
+        name: "mean reward",
         unit: "m/s",
         decimals: 2,
         range: None,
@@ -130,8 +130,8 @@ mod tests {
         let end = |measure: Measure, value: f64| measure.axis([value].into_iter());
         assert_eq!(end(Measure::BALANCE_TIME, 6.63), (0.0, 8.0));
         assert_eq!(end(Measure::BALANCE_TIME, f64::NAN), (0.0, 2.0));
-        assert_eq!(end(Measure::MEAN_SPEED, 0.183), (0.0, 0.2));
-        assert_eq!(end(Measure::MEAN_SPEED, -0.03), (-0.04, 0.02));
+        assert_eq!(end(Measure::REWARDED_SPEED, 0.183), (0.0, 0.2));
+        assert_eq!(end(Measure::REWARDED_SPEED, -0.03), (-0.04, 0.02));
         assert_eq!(end(Measure::MEAN_HEIGHT, 7.0), (-1.0, 1.0));
     }
 
