@@ -350,6 +350,8 @@ fn results() -> results::Info {
             .collect(),
         summary: vec!["gate opened at step 2413, τ 2633 steps, final share 14 %".to_owned()],
         evaluation: Some((1..=10).map(|k| (k * 10, 1.4 * f64::from(k))).collect()),
+        measure: results::Measure::BALANCE_TIME,
+        start: Some(results::Start::RELEASE),
     }
 }
 
@@ -375,21 +377,42 @@ fn pages_of_results() {
     assert!(results_picture(120, 40, &info, &state).is_ascii());
 }
 
+#[test]
+fn results_of_another_measure() {
+    let mut info = results();
+    for row in &mut info.rollouts {
+        row.mean_reward = (row.duration_s / 6.0 - 1.0).min(0.97);
+    }
+    info.measure = results::Measure::MEAN_HEIGHT;
+    info.start = None;
+    info.evaluation = None;
+    let mut state = results::State::default();
+    insta::assert_snapshot!("results_height_0", results_picture(80, 24, &info, &state));
+    state.next();
+    state.next();
+    insta::assert_snapshot!("results_height_2", results_picture(80, 24, &info, &state));
+}
+
 /// What a terminal receives in `frames` frames of a balancing swing: 30 frames a second,
 /// numbers ten times a second.
-fn bytes(width: u16, height: u16, frames: u32) -> usize {
-    let (info, history, ui) = (info(), history(37), Ui::default());
+fn bytes(
+    (width, height): (u16, u16),
+    frames: u32,
+    info: &Info,
+    scene: impl Fn(u32) -> Snapshot,
+) -> usize {
+    let (history, ui) = (history(37), Ui::default());
     let mut sent: Vec<u8> = Vec::new();
     let viewport = Viewport::Fixed(Rect::new(0, 0, width, height));
     let backend = CrosstermBackend::new(&mut sent);
     let mut terminal = Terminal::with_options(backend, TerminalOptions { viewport }).unwrap();
     let mut panel = running(Phase::Main);
     for k in 0..=frames {
-        let scene = swinging(k);
+        let scene = scene(k);
         if k % 3 == 0 {
             panel = scene;
         }
-        let view = View { info: &info, scene: &scene, panel: &panel, history: &history, ui: &ui };
+        let view = View { info, scene: &scene, panel: &panel, history: &history, ui: &ui };
         terminal.draw(|frame| live::draw(frame, &view)).unwrap();
     }
     drop(terminal);
@@ -418,10 +441,36 @@ fn swinging(k: u32) -> Snapshot {
 #[expect(clippy::print_stderr, reason = "a figure worth seeing beside the limit")]
 fn a_swing_costs_few_bytes() {
     // Synchronised updates add 16 bytes to each frame.
-    let mean = |width, height| (bytes(width, height, 300) - bytes(width, height, 0)) / 300 + 16;
-    let (usual, large) = (mean(80, 24), mean(120, 40));
+    let mean = |size| {
+        let sent = |frames| bytes(size, frames, &info(), swinging);
+        (sent(300) - sent(0)) / 300 + 16
+    };
+    let (usual, large) = (mean((80, 24)), mean((120, 40)));
     eprintln!("bytes a frame: {usual} at 80×24, {large} at 120×40");
     assert!(usual <= 260, "{usual} bytes a frame: over 8 kB/s at 30 frames a second");
+}
+
+/// Frame `k` of a pole that swings higher and higher and goes round, with its map.
+fn swinging_up(k: u32) -> Snapshot {
+    let t = f64::from(k) / 30.0;
+    let (sin, cos) = (5.0 * t).sin_cos();
+    let angle = std::f64::consts::PI + 0.35 * t * sin;
+    let turn = 0.35 * sin + 0.35 * t * 5.0 * cos;
+    let mut scene = Snapshot { shares: swing_up().1.shares, ..swinging(k) };
+    let fast = usize::from(turn.abs() > 3.0);
+    scene.region = fast + if angle.cos() < -0.5 { 0 } else { 2 };
+    scene.state = State::new([0.1 * sin, 0.5 * cos, angle, turn]);
+    scene
+}
+
+#[test]
+#[expect(clippy::print_stderr, reason = "a figure worth seeing beside the limit")]
+fn a_swing_up_costs_not_many_more() {
+    let (info, _) = swing_up();
+    let sent = |frames| bytes((80, 24), frames, &info, swinging_up);
+    let usual = (sent(300) - sent(0)) / 300 + 16;
+    eprintln!("bytes a frame: {usual} at 80×24");
+    assert!(usual <= 520, "{usual} bytes a frame: over 16 kB/s at 30 frames a second");
 }
 
 fn any_number() -> impl Strategy<Value = f64> {

@@ -299,5 +299,7 @@ fn results_info(finished: &Finished) -> results::Info {
         files,
         summary,
         evaluation: (!finished.tenths.is_empty()).then(|| finished.tenths.clone()),
+        measure: results::Measure::BALANCE_TIME,
+        start: Some(results::Start::RELEASE),
     }
 }

@@ -55,6 +55,20 @@ impl Canvas {
 
     /// Lights the dots between two corners whose middles are `inside`.
     pub fn fill(&mut self, from: Point, to: Point, role: Role, inside: impl Fn(Point) -> bool) {
+        self.visit(from, to, inside, |cell, bit| {
+            cell.lit |= bit;
+            cell.role = Some(role);
+        });
+    }
+
+    /// Calls `change` for the dots between two corners whose middles are `inside`.
+    fn visit(
+        &mut self,
+        from: Point,
+        to: Point,
+        inside: impl Fn(Point) -> bool,
+        change: impl Fn(&mut Cell, u8),
+    ) {
         if !(from.0 + from.1 + to.0 + to.1).is_finite() {
             return;
         }
@@ -62,8 +76,10 @@ impl Canvas {
         let bottom = place(to.1.ceil().min(self.height()));
         for y in place(from.1.floor())..bottom {
             for x in place(from.0.floor())..right {
-                if inside((f64::from(x) + 0.5, f64::from(y) + 0.5)) {
-                    self.light(x, y, role);
+                if inside((f64::from(x) + 0.5, f64::from(y) + 0.5))
+                    && let Some((cell, bit)) = self.dot(x, y)
+                {
+                    change(cell, bit);
                 }
             }
         }
@@ -75,19 +91,6 @@ impl Canvas {
         let index = usize::from(y / 4) * usize::from(self.columns) + usize::from(x / 2);
         let bit = BITS[usize::from(x % 2)][usize::from(y % 4)];
         self.cells.get_mut(index).map(|cell| (cell, bit))
-    }
-
-    fn light(&mut self, x: u16, y: u16, role: Role) {
-        if let Some((cell, bit)) = self.dot(x, y) {
-            cell.lit |= bit;
-            cell.role = Some(role);
-        }
-    }
-
-    fn put_out(&mut self, x: u16, y: u16) {
-        if let Some((cell, bit)) = self.dot(x, y) {
-            cell.lit &= !bit;
-        }
     }
 
     /// A filled rectangle.
@@ -119,19 +122,14 @@ impl Canvas {
     /// Puts out the dots at most `radius` away from a segment, so that what is drawn there
     /// next stands in front of what was there before.
     pub fn clear(&mut self, from: Point, to: Point, radius: f64) {
-        for y in 0..self.rows * 4 {
-            for x in 0..self.columns * 2 {
-                if distance((f64::from(x) + 0.5, f64::from(y) + 0.5), from, to) <= radius {
-                    self.put_out(x, y);
-                }
-            }
-        }
+        let (low, high) = around(from, to, radius);
+        let inside = |p| distance(p, from, to) <= radius;
+        self.visit(low, high, inside, |cell, bit| cell.lit &= !bit);
     }
 
     /// A thick line with round ends: all that is at most `radius` away from a segment.
     pub fn capsule(&mut self, from: Point, to: Point, radius: f64, role: Role) {
-        let low = (from.0.min(to.0) - radius, from.1.min(to.1) - radius);
-        let high = (from.0.max(to.0) + radius, from.1.max(to.1) + radius);
+        let (low, high) = around(from, to, radius);
         self.fill(low, high, role, |p| distance(p, from, to) <= radius);
     }
 
@@ -239,6 +237,14 @@ impl Canvas {
     }
 }
 
+/// The corners of the rectangle around all that is at most `radius` away from a segment.
+fn around(from: Point, to: Point, radius: f64) -> (Point, Point) {
+    (
+        (from.0.min(to.0) - radius, from.1.min(to.1) - radius),
+        (from.0.max(to.0) + radius, from.1.max(to.1) + radius),
+    )
+}
+
 /// A point in dots as columns and rows.
 fn in_cells(point: Point) -> Point {
     (point.0 / DOTS_ACROSS, point.1 / DOTS_DOWN)
@@ -273,6 +279,17 @@ mod tests {
             let area = 4.0 * 50.99 + std::f64::consts::PI * 4.0;
             assert!((f64::from(lit(&canvas)) - area).abs() < 0.06 * area, "{}", lit(&canvas));
         }
+    }
+
+    #[test]
+    fn what_is_cleared_is_dark_and_the_rest_stays() {
+        let mut canvas = Canvas::new(10, 5, Glyphs::Braille);
+        canvas.rectangle((0.0, 0.0), (20.0, 20.0), Role::Text);
+        canvas.clear((10.0, 10.0), (10.0, 10.0), 2.0);
+        assert_eq!(lit(&canvas), 400 - 12);
+        canvas.clear((-50.0, f64::NAN), (1e300, 3.0), 9.0);
+        canvas.clear((0.0, 10.0), (20.0, 10.0), 99.0);
+        assert_eq!(lit(&canvas), 0);
     }
 
     #[test]

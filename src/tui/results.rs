@@ -3,6 +3,9 @@
 //! At 80×24 one page at a time; where there is room all of them at once.
 
 mod charts;
+mod measure;
+
+pub use measure::{Measure, Start};
 
 use ratatui::Frame;
 
@@ -30,14 +33,28 @@ pub struct Info {
     pub files: Vec<String>,
     /// What else is to be said of it, a line each.
     pub summary: Vec<String>,
-    /// The robot alone after each tenth of main: percent of main, mean time, s.
+    /// The robot alone after each tenth of main: percent of main, mean of the measure.
     pub evaluation: Option<Vec<(u8, f64)>>,
+    /// What rollouts are measured by.
+    pub measure: Measure,
+    /// How rollouts began; `None` where they all begin alike.
+    pub start: Option<Start>,
 }
 
 impl Info {
     /// The rollouts of `phase` that count.
     fn of(&self, phase: Phase) -> impl Iterator<Item = &EpisodeRow> {
         metrics::rollouts_of(&self.rollouts, phase)
+    }
+
+    /// The measure of the rollouts of `phase` that count.
+    fn measured(&self, phase: Phase) -> Vec<f64> {
+        self.of(phase).map(self.measure.value).collect()
+    }
+
+    /// The pages' titles.
+    const fn pages(&self) -> [&'static str; PAGES] {
+        [self.measure.page, "sharing", "robot alone", "files"]
     }
 }
 
@@ -54,8 +71,8 @@ pub struct State {
     pub look: Look,
 }
 
-/// The pages' titles.
-const PAGES: [&str; 4] = ["balance", "sharing", "robot alone", "files"];
+/// How many pages there are.
+const PAGES: usize = 4;
 
 impl State {
     /// A screen that looks like `look`.
@@ -66,12 +83,12 @@ impl State {
 
     /// Turns to the next page.
     pub const fn next(&mut self) {
-        self.page = (self.page + 1) % PAGES.len();
+        self.page = (self.page + 1) % PAGES;
     }
 
     /// Turns to the page before.
     pub const fn previous(&mut self) {
-        self.page = (self.page + PAGES.len() - 1) % PAGES.len();
+        self.page = (self.page + PAGES - 1) % PAGES;
     }
 }
 
@@ -99,13 +116,13 @@ fn whole(pen: &mut Pen<'_>, info: &Info, state: &State) {
         let (half, upper) = (width / 2, (height - 3) / 2);
         for (page, (column, row)) in (0..).zip([(0, 0), (half, 0), (0, upper), (half, upper)]) {
             let mut part = pen.part(column, 2 + row, half - 1, upper);
-            part.text(1, 0, PAGES[page], Role::Strong);
+            part.text(1, 0, info.pages()[page], Role::Strong);
             let (w, h) = (part.width(), part.height());
             draw_page(&mut part.part(0, 1, w, h - 2), info, page);
         }
     } else {
         let mut x = 1;
-        for (page, title) in PAGES.iter().enumerate() {
+        for (page, title) in info.pages().iter().enumerate() {
             let is_here = page == state.page;
             let shown = if is_here { format!("[{title}]") } else { format!(" {title} ") };
             x = pen.text(x, 1, &shown, if is_here { Role::Strong } else { Role::Dim }) + 2;
@@ -129,7 +146,7 @@ fn draw_page(pen: &mut Pen<'_>, info: &Info, page: usize) {
         0 => {
             let lines = statistics(info, &[Phase::Introduction, Phase::Main]);
             let chart = height.saturating_sub(u16::try_from(lines.len()).unwrap_or(0));
-            charts::balance(&mut pen.part(0, 0, width, chart), info);
+            charts::measured(&mut pen.part(0, 0, width, chart), info);
             write(&mut pen.part(0, chart, width, height - chart), &lines);
         }
         1 => charts::sharing(pen, info),
@@ -143,20 +160,22 @@ fn draw_page(pen: &mut Pen<'_>, info: &Info, page: usize) {
     }
 }
 
-/// A line for each of `phases` that took place: its balance time.
+/// A line for each of `phases` that took place: its measure.
 fn statistics(info: &Info, phases: &[Phase]) -> Vec<String> {
+    let (unit, decimals) = (info.measure.unit, info.measure.decimals + 2);
     let line = |phase: &Phase| {
-        let times: Vec<f64> = info.of(*phase).map(|row| row.duration_s).collect();
-        let average = mean(&times)?;
-        let squares = times.iter().map(|time| (time - average).powi(2)).sum::<f64>();
-        let deviation = (squares / (real(times.len()) - 1.0)).sqrt();
-        Some(format!(
-            "{:<13}{:>4} rollouts   mean {} s   sd {} s",
+        let values = info.measured(*phase);
+        let average = mean(&values)?;
+        let squares = values.iter().map(|value| (value - average).powi(2)).sum::<f64>();
+        let deviation = (squares / (real(values.len()) - 1.0)).sqrt();
+        let line = format!(
+            "{:<13}{:>4} rollouts   mean {} {unit}   sd {} {unit}",
             live::phase_word(*phase),
-            times.len(),
-            fixed(average, 6, 2),
-            fixed(deviation, 5, 2),
-        ))
+            values.len(),
+            fixed(average, 6, decimals),
+            fixed(deviation, 5, decimals),
+        );
+        Some(line.trim_end().to_owned())
     };
     phases.iter().filter_map(line).collect()
 }

@@ -11,7 +11,7 @@ pub fn width(info: &Info, width: u16) -> u16 {
     match info.regions {
         None => 0,
         Some(_) if width >= 112 => 48,
-        Some(_) => 25,
+        Some(_) => 28,
     }
 }
 

@@ -6,11 +6,25 @@ use ratatui::text::Line;
 use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Widget};
 
 use super::Info;
+use super::measure::Measure;
 use crate::record::EpisodeRow;
 use crate::session::Phase;
 use crate::tui::palette::{Glyphs, Role};
 use crate::tui::pen::{Pen, columns};
 use crate::tui::text::{moving_mean, real};
+
+impl Scale {
+    /// An axis for `values` of `measure`.
+    fn of(measure: &Measure, title: String, values: impl Iterator<Item = f64>) -> Self {
+        let (from, to) = measure.axis(values);
+        Self { title, from, to, decimals: measure.decimals }
+    }
+
+    /// An axis of rollouts up to the `last`.
+    fn rollouts(title: &str, last: f64) -> Self {
+        Self { title: title.to_owned(), from: 1.0, to: last, decimals: 0 }
+    }
+}
 
 type Points = Vec<(f64, f64)>;
 
@@ -45,19 +59,18 @@ impl Curve {
 
 /// An axis: its title, where it begins and ends, decimals of its labels.
 struct Scale {
-    title: &'static str,
+    title: String,
     from: f64,
     to: f64,
     decimals: usize,
 }
 
-/// Balance time of each rollout and its moving average.
-pub fn balance(pen: &mut Pen<'_>, info: &Info) {
-    let practice: Vec<f64> = info.of(Phase::Introduction).map(|row| row.duration_s).collect();
-    let main: Vec<f64> = info.of(Phase::Main).map(|row| row.duration_s).collect();
+/// The measure of each rollout and its moving average.
+pub fn measured(pen: &mut Pen<'_>, info: &Info) {
+    let practice = info.measured(Phase::Introduction);
+    let main = info.measured(Phase::Main);
     let first = real(practice.len());
     let count = first + real(main.len());
-    let longest = practice.iter().chain(&main).copied().fold(1.0, f64::max);
     let average = moving_mean(&main, 10);
     let curves = [
         Curve {
@@ -79,8 +92,9 @@ pub fn balance(pen: &mut Pen<'_>, info: &Info) {
             points: numbered(&average, first),
         },
     ];
-    let x = Scale { title: "rollout", from: 1.0, to: count, decimals: 0 };
-    let y = Scale { title: "balance time, s", from: 0.0, to: even(longest), decimals: 0 };
+    let x = Scale::rollouts("rollout", count);
+    let all = practice.iter().chain(&main).copied();
+    let y = Scale::of(&info.measure, info.measure.title(), all);
     chart(pen, &curves, &x, &y);
 }
 
@@ -106,54 +120,54 @@ pub fn sharing(pen: &mut Pen<'_>, info: &Info) {
         },
     ];
     let last = info.of(Phase::Main).map(|row| row.episode).max().unwrap_or(1);
-    let x = Scale { title: "rollout of main", from: 1.0, to: f64::from(last), decimals: 0 };
-    let y = Scale { title: "%", from: 0.0, to: 100.0, decimals: 0 };
+    let x = Scale::rollouts("rollout of main", f64::from(last));
+    let y = Scale { title: "%".to_owned(), from: 0.0, to: 100.0, decimals: 0 };
     chart(pen, &curves, &x, &y);
 }
 
-/// The robot's and nobody's time against the release angle; beside it, if it was evaluated,
+/// What the robot and nobody came to, by how it began; beside it, if it was evaluated,
 /// how the robot got better through main.
 pub fn alone(pen: &mut Pen<'_>, info: &Info) {
     let (width, height) = (pen.width(), pen.height());
     match &info.evaluation {
         Some(tenths) if !tenths.is_empty() => {
             let half = width / 2;
-            angles(&mut pen.part(0, 0, half.saturating_sub(2), height), info);
-            learning(&mut pen.part(half, 0, width - half, height), tenths);
+            starts(&mut pen.part(0, 0, half.saturating_sub(2), height), info);
+            learning(&mut pen.part(half, 0, width - half, height), &info.measure, tenths);
         }
-        _ => angles(pen, info),
+        _ => starts(pen, info),
     }
 }
 
-fn angles(pen: &mut Pen<'_>, info: &Info) {
+fn starts(pen: &mut Pen<'_>, info: &Info) {
     let points = |phase| -> Points {
-        info.of(phase).map(|row| (row.start.to_degrees(), row.duration_s)).collect()
+        let at = |row: &EpisodeRow| {
+            info.start.map_or_else(|| f64::from(row.episode), |start| (start.value)(row))
+        };
+        info.of(phase).map(|row| (at(row), (info.measure.value)(row))).collect()
     };
     let (robot, nobody) = (points(Phase::Autonomous), points(Phase::ZeroControl));
     let all = || robot.iter().chain(&nobody);
     let widest = all().map(|point| point.0.abs()).fold(0.1, f64::max);
-    let longest = all().map(|point| point.1).fold(1.0, f64::max);
+    let x = match info.start {
+        Some(start) => Scale { title: start.title(), from: -widest, to: widest, decimals: 1 },
+        None => Scale::rollouts("rollout", widest),
+    };
+    let title = info.measure.title_alone();
+    let y = Scale::of(&info.measure, title, all().map(|point| point.1));
     let curves = [
         Curve { name: "nobody", graph: GraphType::Scatter, role: Role::Dim, points: nobody },
         Curve { name: "robot", graph: GraphType::Scatter, role: Role::Robot, points: robot },
     ];
-    let x = Scale { title: "release, °", from: -widest, to: widest, decimals: 1 };
-    let y = Scale { title: "alone, s", from: 0.0, to: even(longest), decimals: 0 };
     chart(pen, &curves, &x, &y);
 }
 
-fn learning(pen: &mut Pen<'_>, tenths: &[(u8, f64)]) {
-    let points: Points = tenths.iter().map(|(part, time)| (f64::from(*part), *time)).collect();
-    let longest = points.iter().map(|point| point.1).fold(1.0, f64::max);
+fn learning(pen: &mut Pen<'_>, measure: &Measure, tenths: &[(u8, f64)]) {
+    let points: Points = tenths.iter().map(|(part, value)| (f64::from(*part), *value)).collect();
+    let y = Scale::of(measure, measure.title_alone(), points.iter().map(|point| point.1));
     let curves = [Curve { name: "robot, mean", graph: GraphType::Line, role: Role::Robot, points }];
-    let x = Scale { title: "% of main", from: 0.0, to: 100.0, decimals: 0 };
-    let y = Scale { title: "alone, s", from: 0.0, to: even(longest), decimals: 0 };
+    let x = Scale { title: "% of main".to_owned(), from: 0.0, to: 100.0, decimals: 0 };
     chart(pen, &curves, &x, &y);
-}
-
-/// The end of an axis whose middle is a whole number, too.
-fn even(longest: f64) -> f64 {
-    (longest / 2.0).ceil() * 2.0
 }
 
 /// `values` as points after the first `before` rollouts.

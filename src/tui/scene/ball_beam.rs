@@ -28,6 +28,8 @@ pub const TILT_FACTOR: f64 = 1.5;
 
 /// The drawn ball's radius, m: the real one's 13 mm would be hard to see.
 const BALL_M: f64 = 0.02;
+/// The drawn ball's radius at least, in dots.
+const LEAST_BALL: f64 = 2.6;
 /// How many dots of the trail there are, and how long they lie apart, s.
 const TRAIL: (u8, f64) = (6, 0.07);
 
@@ -62,7 +64,7 @@ impl Place {
         let scale = ((canvas.width() - before - after) / length_m)
             .min((canvas.height() - 4.0 - 4.0 * beam) / (up_m + rise_m))
             .max(1e-6);
-        let (rise, ball) = (rise_m * scale, BALL_M * scale);
+        let (rise, ball) = (rise_m * scale, (BALL_M * scale).max(LEAST_BALL));
         let spare = (canvas.height() - 2.0 * rise - 2.0 * ball - 2.0 * beam).max(0.0);
         // Most of what is left over is the servo's, below.
         let pivot_y = (rise + 2.0 * ball + beam + 0.25 * spare).floor();
@@ -167,6 +169,7 @@ fn ball(canvas: &mut Canvas, place: &Place, x_m: f64, speed: f64) {
     let rest = place.beam + place.ball;
     let middle = place.on_beam(x_m, rest);
     let behind = place.ball + 1.5;
+    let size = (place.ball / 4.0).min(1.0);
     for age in (1..=TRAIL.0).map(f64::from) {
         let path = speed.abs() * place.scale * TRAIL.1 * age;
         if path < 1.0 {
@@ -175,7 +178,7 @@ fn ball(canvas: &mut Canvas, place: &Place, x_m: f64, speed: f64) {
         let back = (behind + path) * speed.signum();
         let from_middle = x_m - back / place.scale;
         let at = place.on_beam(from_middle, rest);
-        canvas.mote(at, 1.8 - 0.17 * age, Role::Dim);
+        canvas.mote(at, (1.8 - 0.17 * age) * size, Role::Dim);
     }
     canvas.disc(middle, place.ball, Role::Text);
 }

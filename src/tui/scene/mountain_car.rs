@@ -189,7 +189,7 @@ impl Car {
 
     fn wheels(&self, canvas: &mut Canvas) {
         for at in [self.rear, self.front] {
-            canvas.capsule(at, at, self.wheel, Role::Strong);
+            canvas.disc(at, self.wheel, Role::Strong);
         }
     }
 }

@@ -127,6 +127,15 @@ impl Grid {
         }
     }
 
+    /// The columns of a cell's words; right of them moves the dot.
+    const fn words(self) -> u16 {
+        match self {
+            Self { down: 1, .. } => 6,
+            Self { across: ..=10, .. } => 7,
+            _ => 8,
+        }
+    }
+
     /// The rows of the heads, the cells and their borders.
     const fn rows(self) -> u16 {
         3 * (self.down + 1) + 2
@@ -165,7 +174,7 @@ pub fn map(pen: &mut Pen<'_>, seen: &Map<'_>) {
         pen.part(0, below, whole, 1).centred(0, &cut(&name, whole.into()), Role::Strong);
     }
     if height > below + 1 && seen.shares.is_some() {
-        pen.part(0, below + 1, whole, 1).centred(0, "% of you  ▒ robot", Role::Dim);
+        pen.part(0, below + 1, whole, 1).centred(0, "you: %   ▒ robot", Role::Dim);
     }
 }
 
@@ -209,17 +218,18 @@ fn cell(pen: &mut Pen<'_>, seen: &Map<'_>, grid: Grid, region: usize) {
     let word = name.split(' ').next().unwrap_or_default();
     let word = if is_here { word.to_uppercase() } else { word.to_owned() };
     let role = if is_here { Role::Strong } else { Role::Text };
-    let words = [word, share.map_or_else(String::new, |share| percent(share, 3))];
+    let words = [word, share.map_or_else(String::new, yours)];
     if grid.down == 1 {
         // One row: the share says more than a name that the eye finds by place.
-        let word = if share.is_some() { &words[1] } else { &words[0] };
-        part.text(0, 0, &format!(" {} ", word.trim()), role);
+        let number = share.map(percent);
+        part.text(0, 0, &format!(" {} ", number.as_ref().unwrap_or(&words[0]).trim()), role);
         return;
     }
     let first = (grid.down - 2) / 2;
     for (word, row) in words.iter().zip(first..) {
         if !word.is_empty() {
-            part.text(0, row, &format!("{:<7}", cut(word, 7)), role);
+            let width = usize::from(grid.words());
+            part.text(0, row, &format!("{:<width$}", cut(word, 7)), role);
         }
     }
 }
@@ -238,19 +248,28 @@ fn here(pen: &mut Pen<'_>, seen: &Map<'_>, grid: Grid) {
         return;
     }
     // Right of the words, so that it hides none.
-    let words = if grid.down == 1 { 6 } else { 7 };
+    let words = grid.words();
     let (width, height) = (grid.across.saturating_sub(words), grid.down);
     let mut field = pen.part(x + 1 + words, y + 1, width, height);
     let glyphs = field.look.glyphs;
     let mut canvas = Canvas::new(width, height, glyphs);
     let (right, down) = seen.borders.part(seen.current, seen.theta, seen.theta_dot);
     let radius = 2.0;
-    let along = |part: f64, dots: f64| radius + part * (dots - 2.0 * radius).max(0.0);
+    // On the border of dots, where the disc is round.
+    let along = |part: f64, dots: f64| (radius + part * (dots - 2.0 * radius).max(0.0)).round();
     let middle = (along(right, canvas.width()), along(down, canvas.height()));
     if glyphs == Glyphs::Ascii {
         canvas.glyph(middle.0 / DOTS_ACROSS, middle.1 / DOTS_DOWN, 'O', Role::Strong);
     } else {
         canvas.disc(middle, radius, Role::Strong);
+    }
+    // A gap keeps it apart from what fills the region.
+    let (from, to) = (place((middle.0 - radius) / DOTS_ACROSS), middle.0 + radius - 1.0);
+    let blanks = place(to / DOTS_ACROSS) + 2 - from.saturating_sub(1);
+    let rows =
+        place((middle.1 - radius) / DOTS_DOWN)..=place((middle.1 + radius - 1.0) / DOTS_DOWN);
+    for row in rows {
+        field.repeat(from.saturating_sub(1), row, " ", blanks, Role::Text);
     }
     canvas.draw(&mut field);
 }
@@ -344,12 +363,17 @@ fn bar(
     if end > from {
         pen.repeat(x, 0, rest, length - first, rest_role);
     }
-    pen.text_until(to, 0, &percent(part, 3), role);
+    pen.text_until(to, 0, &percent(part), role);
 }
 
 /// A part of 1 in percent, of a fixed width.
-fn percent(part: f64, width: usize) -> String {
-    format!("{} %", fixed(part * 100.0, width, 0))
+fn percent(part: f64) -> String {
+    format!("{} %", fixed(part * 100.0, 3, 0))
+}
+
+/// The person's share in percent, of the width that is free of the dot.
+fn yours(share: f64) -> String {
+    format!("you{}", fixed(share * 100.0, 4, 0))
 }
 
 #[cfg(test)]
