@@ -7,11 +7,15 @@ use std::path::{Path, PathBuf};
 use super::reading::nearest;
 
 /// The profiles built into the program.
-const BUILT_IN: [(&str, &str); 4] = [
+const BUILT_IN: [(&str, &str); 8] = [
     ("balance", include_str!("../../profiles/balance.ron")),
+    ("balance-modern", include_str!("../../profiles/balance-modern.ron")),
     ("mountain-car", include_str!("../../profiles/mountain-car.ron")),
+    ("mountain-car-modern", include_str!("../../profiles/mountain-car-modern.ron")),
     ("speed-up", include_str!("../../profiles/speed-up.ron")),
+    ("speed-up-modern", include_str!("../../profiles/speed-up-modern.ron")),
     ("swing-up", include_str!("../../profiles/swing-up.ron")),
+    ("swing-up-modern", include_str!("../../profiles/swing-up-modern.ron")),
 ];
 
 /// No profile is longer than this, bytes.
