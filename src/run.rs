@@ -16,6 +16,7 @@ use clap::error::ErrorKind;
 
 use crate::cli::{Cli, Command};
 use crate::clock::VirtualClock;
+use crate::report::achieved::Yardstick;
 use outcome::Finished;
 use session::{Company, Session};
 use shutdown::Shutdown;
@@ -96,12 +97,14 @@ fn headless(run: &crate::cli::Run) -> Result<ExitCode, RunError> {
 fn sentences(finished: &Finished) -> Vec<String> {
     let mut lines = finished.results.phases.sentences();
     if !finished.tenths.is_empty() {
+        let Yardstick { name, unit, decimals, .. } = finished.results.yardstick();
         let tenths: Vec<String> = finished
             .tenths
             .iter()
-            .map(|(percent, mean)| format!("{percent} %: {mean:.2} s"))
+            .map(|(percent, mean)| format!("{percent} %: {mean:.decimals$}"))
             .collect();
-        lines.push(format!("after each tenth  {}", tenths.join(", ")));
+        let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
+        lines.push(format!("after each tenth  {name}{unit}: {}", tenths.join(", ")));
     }
     if let Some(cause) = &finished.cause {
         lines.push(format!("ended early: {cause}"));

@@ -14,7 +14,7 @@ use crate::learner::Model;
 use crate::profile::Profile;
 use crate::record::sidecar::{Lateness, Timing};
 use crate::record::{EpisodeRow, EvaluationRow, Sidecar, Status};
-use crate::report::achieved::Achieved;
+use crate::report::achieved::{Achieved, Yardstick, yardstick};
 use crate::report::metrics::{self, MainEnd, Phases, RegionEnd};
 use crate::session::Phase;
 use crate::session::machine::Finish;
@@ -63,6 +63,12 @@ impl Results {
     pub fn title(&self) -> String {
         let Self { task, mode, learner, preset, subject, trial, .. } = self;
         format!("{task} · {mode} · {learner} · {preset}   {subject} trial {trial:03}")
+    }
+
+    /// The number by which its rollouts are judged.
+    #[must_use]
+    pub fn yardstick(&self) -> Yardstick {
+        yardstick(&self.task)
     }
 
     /// How it ended, a word.
