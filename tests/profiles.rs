@@ -116,6 +116,26 @@ fn holds_every_key(task: &str) {
     }
 }
 
+/// A modern profile holds what differs, each key with the default that it differs from.
+#[test]
+fn the_modern_profiles_say_what_differs_from_the_plain_ones() {
+    for task in Experiment::NAMES {
+        let text = plain(&format!("{task}-modern"));
+        let (modern, usual) = (read(&text), read(&plain(task)));
+        assert_eq!((modern.preset.as_str(), usual.preset.as_str()), ("modern", "thesis"));
+        let usual = key_lines(&usual.to_ron());
+        let keys = key_lines(&text);
+        assert!(text.contains("Never pool sessions"), "{task}");
+        assert!(keys.len() > 3, "{task}");
+        for (key, value, comment) in keys.iter().filter(|(key, _, _)| key != "task") {
+            let (_, default, _) = usual.iter().find(|(known, _, _)| known == key).unwrap();
+            assert_ne!(value, default, "{task}: {key}");
+            let told = comment.contains(&format!("default {default}"));
+            assert!(told, "{task}: {key}: {comment:?} but {default}");
+        }
+    }
+}
+
 #[test]
 fn bad_profiles_are_told_all_their_faults() {
     let mut bad: Vec<PathBuf> = std::fs::read_dir("tests/data/profiles/bad")
