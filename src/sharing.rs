@@ -218,12 +218,17 @@ impl Sharing {
         Observed { success, gate_opened, froze }
     }
 
+    /// Whether `region` is handed over for good.
+    #[must_use]
+    pub fn is_frozen(&self, region: usize) -> bool {
+        self.mode == Mode::Simultaneous
+            && self.regions.get(region).is_some_and(|r| r.weight.is_frozen())
+    }
+
     /// Whether what happens in `region` teaches the robot no more.
     #[must_use]
     pub fn is_learner_frozen(&self, region: usize) -> bool {
-        self.mode == Mode::Simultaneous
-            && self.dynamics.freezes_learner()
-            && self.regions.get(region).is_some_and(|r| r.weight.is_frozen())
+        self.dynamics.freezes_learner() && self.is_frozen(region)
     }
 
     /// The step, or episode, at which `region`'s gate opened and the time constant found

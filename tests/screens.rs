@@ -4,12 +4,16 @@
 #![expect(clippy::unwrap_used, reason = "a screen that cannot be drawn has failed its test")]
 
 use coadapt::control::snapshot::Snapshot;
+use coadapt::profile::Document;
 use coadapt::record::EpisodeRow;
+use coadapt::report::achieved::yardstick;
+use coadapt::report::metrics::RegionEnd;
 use coadapt::session::machine::{Finish, Stage};
-use coadapt::session::plan::{Instructions, Params, Plan};
+use coadapt::session::plan::{Instructions, Params, PhasePlan, Plan};
 use coadapt::session::{Moment, Phase};
 use coadapt::sharing::weight::Opened;
 use coadapt::signal::{End, Intent, Seconds, State, Tallied, Tick};
+use coadapt::task::swing_up;
 use coadapt::tui::live::{self, History, Info, Ui, View};
 use coadapt::tui::palette::{Glyphs, Look, Palette};
 use coadapt::tui::results;
@@ -20,6 +24,7 @@ use proptest::prelude::*;
 use ratatui::backend::{CrosstermBackend, TestBackend};
 use ratatui::layout::Rect;
 use ratatui::{Terminal, TerminalOptions, Viewport};
+use std::path::Path;
 
 fn info() -> Info {
     let params = Params::default();
@@ -43,6 +48,8 @@ fn info() -> Info {
         autonomous_hold_s: params.autonomous_hold_s,
         break_s: params.break_s,
         gate: 0.4,
+        gate_is_timer: true,
+        by_episode: false,
         action_limit: 10.0,
         action_unit: "N".to_owned(),
         scene: Scene::CartPole(Geometry {
@@ -80,6 +87,10 @@ fn swing_up() -> (Info, Snapshot) {
     snapshot.region = 2;
     snapshot.shares = [0.03, 0.05, 0.22, 0.48, 0.74, 0.61, 1.0, 1.0];
     snapshot.successes = [0.97, 0.95, 0.74, 0.52, 0.31, 0.4, 0.0, 0.0];
+    snapshot.frozen[0] = true;
+    snapshot.tallied = Tallied::new([-0.12, 0.31, 4.2]);
+    info.gate = 0.0;
+    info.phases = phases_of("swing-up");
     (info, snapshot)
 }
 
@@ -94,8 +105,40 @@ fn the_map_beside_the_whole_circle() {
 }
 
 #[test]
-fn the_other_plants() {
+fn a_region_that_is_handed_over_says_so() {
+    let (info, mut snapshot) = swing_up();
+    snapshot.state = State::new([0.2, 0.4, 3.0, -2.2]);
+    snapshot.region = 0;
+    let screen = picture(80, 24, &info, &snapshot, &Ui::default()).to_string();
+    assert!(screen.contains("handed over") && screen.contains("DOWN SLOW"), "{screen}");
+}
+
+/// The phases of a task's plain profile.
+fn phases_of(task: &str) -> Vec<PhasePlan> {
+    let document = Document::find(task, Path::new("tests/data/no-such-folder")).unwrap();
+    let profile = document.read().unwrap();
+    Plan::new(&profile.session, profile.tick(), 1, true).phases
+}
+
+#[test]
+fn swing_up_in_every_phase() {
+    let (info, mut snapshot) = swing_up();
+    for phase in [Phase::Introduction, Phase::Autonomous, Phase::ZeroControl] {
+        snapshot.stage = Stage::Running(moment(phase));
+        if phase != Phase::Introduction {
+            snapshot.human = Intent::Absent;
+        }
+        small(&format!("swing_up_{}", phase.word()), &info, &snapshot, &Ui::default());
+    }
+}
+
+#[test]
+fn the_ball_on_its_beam() {
     let (mut info, mut snapshot) = (info(), running(Phase::Main));
+    info.task = "speed-up".to_owned();
+    info.phases = phases_of("speed-up");
+    info.gate = 0.0;
+    info.action_unit = "V".to_owned();
     info.scene = Scene::BallBeam(ball_beam::Geometry {
         beam_half_length_m: 0.2125,
         limit_m: 0.17,
@@ -103,11 +146,30 @@ fn the_other_plants() {
         beam_limit_rad: 5_f64.to_radians(),
     });
     snapshot.state = State::new([0.05, 0.18, 0.6, 0.0]);
-    small("ball_beam", &info, &snapshot, &Ui::default());
+    snapshot.tallied = Tallied::new([0.124, 0.0]);
+    both("speed_up", &info, &snapshot, &Ui::default());
+    snapshot.state = State::new([0.19, 0.11, 0.9, 0.0]);
+    snapshot.tallied = Tallied::new([0.124, 3.0]);
+    small("speed_up_hit", &info, &snapshot, &Ui::default());
+}
+
+#[test]
+fn the_car_in_its_valley() {
+    let (mut info, mut snapshot) = (info(), running(Phase::Main));
+    info.task = "mountain-car".to_owned();
+    info.by_episode = true;
+    info.gate = 0.5;
+    info.action_limit = 1.0;
+    info.action_unit = String::new();
+    info.tick_s = 0.04;
     info.scene =
         Scene::MountainCar(mountain_car::Geometry { left: -1.2, goal: 0.5, speed_limit: 0.07 });
     snapshot.state = State::new([-0.2, 0.03]);
-    small("mountain_car", &info, &snapshot, &Ui::default());
+    snapshot.gate = Some(Opened { step: 3, tau: 20.0 });
+    snapshot.human = Intent::fresh(1.0);
+    snapshot.machine = Some(0.62);
+    snapshot.applied = 0.86;
+    both("mountain_car", &info, &snapshot, &Ui::default());
 }
 
 fn moment(phase: Phase) -> Moment {
@@ -350,8 +412,9 @@ fn results() -> results::Info {
             .collect(),
         summary: vec!["gate opened at step 2413, τ 2633 steps, final share 14 %".to_owned()],
         evaluation: Some((1..=10).map(|k| (k * 10, 1.4 * f64::from(k))).collect()),
-        measure: results::Measure::BALANCE_TIME,
+        measure: yardstick("balance"),
         start: Some(results::Start::RELEASE),
+        regions: Vec::new(),
     }
 }
 
@@ -377,13 +440,53 @@ fn pages_of_results() {
     assert!(results_picture(120, 40, &info, &state).is_ascii());
 }
 
+/// Results of the other tasks, whole.
+#[test]
+fn results_of_every_task() {
+    for (task, tallied) in
+        [("swing-up", [0.4, 0.31, 4.2]), ("speed-up", [0.12, 2.0, 0.0]), ("mountain-car", [0.0; 3])]
+    {
+        let mut info = results();
+        info.title = format!("{task} · simultaneous · rfwr · S07 trial 002");
+        for row in &mut info.rollouts {
+            let part = row.duration_s / 20.0;
+            row.tallied = Tallied::new(tallied.map(|number| number * (0.5 + part)));
+            row.steps = 180 - 4 * u32::try_from(row.episode.min(15)).unwrap();
+        }
+        info.measure = yardstick(task);
+        info.start = None;
+        let best = if task == "mountain-car" { 110.0 } else { tallied[0] };
+        info.evaluation =
+            Some((1..=10).map(|k| (k * 10, best * (0.5 + f64::from(k) / 20.0))).collect());
+        if task == "swing-up" {
+            info.regions = swing_up::REGIONS
+                .iter()
+                .zip([0.05, 0.05, 0.12, 0.44, 0.31, 0.6])
+                .map(|(name, share)| RegionEnd {
+                    name: (*name).to_owned(),
+                    share,
+                    success: 1.0 - share,
+                })
+                .collect();
+        }
+        let mut state = results::State::default();
+        for page in 0..3 {
+            let name = format!("results_{}_{page}", task.replace('-', "_"));
+            insta::assert_snapshot!(name, results_picture(80, 24, &info, &state));
+            state.next();
+        }
+        let name = format!("results_{}_120x40", task.replace('-', "_"));
+        insta::assert_snapshot!(name, results_picture(120, 40, &info, &state));
+    }
+}
+
 #[test]
 fn results_of_another_measure() {
     let mut info = results();
     for row in &mut info.rollouts {
-        row.mean_reward = (row.duration_s / 6.0 - 1.0).min(0.97);
+        row.tallied = Tallied::new([(row.duration_s / 6.0 - 1.0).min(0.97), 0.3, 2.0]);
     }
-    info.measure = results::Measure::MEAN_HEIGHT;
+    info.measure = yardstick("swing-up");
     info.start = None;
     info.evaluation = None;
     let mut state = results::State::default();

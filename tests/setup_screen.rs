@@ -297,8 +297,10 @@ fn profiles_are_saved_never_over_another_unasked_and_opened_again() {
     assert!(std::fs::read_to_string(folder.path().join("mine.ron")).unwrap().contains("0.7"));
 
     desk.go(Field::Pole).type_text("0.8").go(Field::Profile).press(KeyCode::Left);
+    assert_eq!(desk.begin().command_line(), "coadapt run balance-modern");
+    desk.go(Field::Profile).press(KeyCode::Left);
     assert_eq!(desk.begin().command_line(), "coadapt run balance");
-    desk.go(Field::Profile).right(1);
+    desk.go(Field::Profile).right(2);
     assert_eq!(desk.begin().command_line(), "coadapt run mine --set plant.pole_length_m=0.8");
 }
 
@@ -322,14 +324,49 @@ fn a_profile_is_asked_for_and_a_wrong_name_can_be_corrected() {
 }
 
 #[test]
+fn a_task_brings_its_plain_profile_and_keeps_who_and_how() {
+    let mut desk = Desk::nowhere();
+    desk.go(Field::Subject).type_text("S07");
+    desk.go(Field::Seed).type_text("42");
+    desk.go(Field::Operator).right(1);
+    for (task, name) in [(1, "swing_up"), (2, "speed_up"), (3, "mountain_car")] {
+        desk.go(Field::Task).right(1);
+        let command = desk.setup.order().command_line();
+        let expected = name.replace('_', "-");
+        assert!(command.starts_with(&format!("coadapt run {expected} --subject S07")), "{task}");
+        assert!(command.ends_with("--operator simulated:average --seed 42"), "{command}");
+        insta::assert_snapshot!(format!("setup_{name}"), desk.picture());
+        let wide = desk.picture_on(120, 40, Look::default());
+        insta::assert_snapshot!(format!("setup_{name}_120x40"), wide);
+    }
+    desk.go(Field::Task).right(1);
+    assert_eq!(desk.setup.order().profile, "balance");
+}
+
+#[test]
+fn a_phase_ends_after_rollouts_or_after_a_time() {
+    let mut desk = Desk::nowhere();
+    desk.go(Field::Task).right(1);
+    assert!(desk.shows("180s") && desk.shows("420s"));
+    desk.go(Field::Introduction).type_text("90s");
+    desk.go(Field::Main).type_text("12");
+    let command = desk.begin().command_line();
+    assert!(command.contains("--set session.introduction_duration_s=90"), "{command}");
+    assert!(command.contains("--rollouts 12"), "{command}");
+    let session = &desk.setup.profile().session;
+    assert_eq!(session.introduction_duration_s, Some(90.0));
+    assert_eq!((session.main_rollouts, session.main_duration_s), (Some(12), None));
+}
+
+#[test]
 fn a_broken_profile_is_not_opened_and_not_in_the_way() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("broken.ron"), "(task: \"balance\", mode: both)").unwrap();
     std::fs::write(folder.path().join("last.ron"), "(task: \"balance\")").unwrap();
     let mut desk = Desk::new(folder.path());
-    desk.go(Field::Profile).right(1);
+    desk.go(Field::Profile).right(2);
     assert!(desk.shows("`mode` cannot be both"));
-    assert_eq!(desk.setup.order().profile, "balance");
+    assert_eq!(desk.setup.order().profile, "balance-modern");
     desk.right(1);
     assert_eq!(desk.setup.order().profile, "last");
 }

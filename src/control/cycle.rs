@@ -440,8 +440,10 @@ impl<W: Witness> Cycle<W> {
                 Some(Phase::Autonomous | Phase::ZeroControl) => 0.0,
             };
             self.seen.successes[region] = self.mind.sharing.success(region);
+            self.seen.frozen[region] = self.mind.sharing.is_frozen(region);
         }
         self.seen.stage = self.stage;
+        self.seen.tallied = self.rollout.tally.tallied();
         self.seen.gate = self.mind.sharing.gate(self.seen.region);
         self.seen.fields = u32::try_from(self.mind.learner.fields()).unwrap_or(u32::MAX);
         self.seen.learned = self.mind.learned;

@@ -192,8 +192,6 @@ impl<W: Witness> Cycle<W> {
     }
 
     fn episode_row(&self, moment: Moment, end: End) -> EpisodeRow {
-        let state = self.seen.state;
-        let region = self.crew.task.region(&state);
         let is_main = moment.phase == Phase::Main;
         let fields = u32::try_from(self.mind.learner.fields()).unwrap_or(u32::MAX);
         EpisodeRow {
@@ -207,14 +205,21 @@ impl<W: Witness> Cycle<W> {
             mean_reward: self.rollout.total_reward / f64::from(moment.step.max(1)),
             share: match moment.phase {
                 Phase::Introduction => Some(1.0),
-                Phase::Main => Some(self.mind.sharing.share(region)),
+                Phase::Main => Some(self.over_regions(Sharing::share)),
                 Phase::Autonomous => Some(0.0),
                 Phase::ZeroControl => None,
             },
-            success: is_main.then(|| self.mind.sharing.success(region)),
+            success: is_main.then(|| self.over_regions(Sharing::success)),
             receptive_fields: (is_main || moment.phase == Phase::Autonomous).then_some(fields),
             tallied: self.rollout.tally.tallied(),
         }
+    }
+
+    /// The mean of `value` over all regions.
+    fn over_regions(&self, value: fn(&Sharing, usize) -> f64) -> f64 {
+        let regions = self.crew.task.regions().len();
+        let sum: f64 = (0..regions).map(|region| value(&self.mind.sharing, region)).sum();
+        sum / f64::from(u32::try_from(regions).unwrap_or(u32::MAX)).max(1.0)
     }
 
     /// Stores the policies of the tenths of main that are over now.

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::record::EpisodeRow;
 use crate::session::machine::Stage;
 use crate::sharing::weight::Opened;
-use crate::signal::{Intent, Seconds, State, Tick};
+use crate::signal::{Intent, Seconds, State, Tallied, Tick};
 
 /// The most regions that a task may have.
 pub const MOST_REGIONS: usize = 8;
@@ -37,6 +37,10 @@ pub struct Snapshot {
     pub shares: [f64; MOST_REGIONS],
     /// The success of each region.
     pub successes: [f64; MOST_REGIONS],
+    /// Whether each region is handed over for good.
+    pub frozen: [bool; MOST_REGIONS],
+    /// What the task counted so far in the rollout under way.
+    pub tallied: Tallied,
     /// Where the gate of the present region opened.
     pub gate: Option<Opened>,
     /// The reward of the state.
@@ -70,6 +74,8 @@ impl Snapshot {
             region: 0,
             shares: [1.0; MOST_REGIONS],
             successes: [0.0; MOST_REGIONS],
+            frozen: [false; MOST_REGIONS],
+            tallied: Tallied::default(),
             gate: None,
             reward: 0.0,
             fields: 0,

@@ -88,6 +88,33 @@ impl Experiment {
         }
     }
 
+    /// Every task with the numbers of the rooms.
+    #[must_use]
+    pub fn all() -> [Self; 4] {
+        [
+            Self::Balance {
+                plant: cart_pole::Params::default(),
+                rules: balance::Params::default(),
+                simulated: simulated::cart_pole::Params::default(),
+            },
+            Self::SwingUp {
+                plant: cart_pole::Params { pole_length_m: 0.6, ..cart_pole::Params::default() },
+                rules: swing_up::Params::default(),
+                simulated: simulated::swing_up::Params::default(),
+            },
+            Self::SpeedUp {
+                plant: ball_beam::Params::default(),
+                rules: speed_up::Params::default(),
+                simulated: simulated::ball_beam::Params::default(),
+            },
+            Self::MountainCar {
+                plant: hill::Params::default(),
+                rules: mountain_car::Params::default(),
+                simulated: simulated::mountain_car::Params::default(),
+            },
+        ]
+    }
+
     /// The task's name outside.
     #[must_use]
     pub const fn name(&self) -> &'static str {

@@ -14,6 +14,8 @@ use crate::task::swing_up::SwingUp;
 /// The one number by which a rollout of a task is judged, for charts and tables.
 #[derive(Clone, Copy, Debug)]
 pub struct Yardstick {
+    /// It in a word, such as `balance`.
+    pub word: &'static str,
     /// What it is, such as `balance time`.
     pub name: &'static str,
     /// Its unit; empty where it has none.
@@ -22,6 +24,8 @@ pub struct Yardstick {
     pub decimals: usize,
     /// Whether more is better.
     pub more_is_better: bool,
+    /// The least and the most that it can be, where both are known.
+    pub range: Option<(f64, f64)>,
     /// The number of a rollout.
     pub of: fn(&EpisodeRow) -> f64,
 }
@@ -29,16 +33,42 @@ pub struct Yardstick {
 /// The yardstick of `task`: balance time, pseudo-height, speed, or steps to the flag.
 #[must_use]
 pub fn yardstick(task: &str) -> Yardstick {
-    let yardstick =
-        |name, unit, decimals, of| Yardstick { name, unit, decimals, more_is_better: true, of };
+    let balance = Yardstick {
+        word: "balance",
+        name: "balance time",
+        unit: "s",
+        decimals: 2,
+        more_is_better: true,
+        range: None,
+        of: |row| row.duration_s,
+    };
     match task {
-        SwingUp::NAME => yardstick("mean height", "", 2, |row| tallied(row, 0)),
-        SpeedUp::NAME => yardstick("mean speed", "m/s", 3, |row| tallied(row, 0)),
-        MountainCar::NAME => Yardstick {
-            more_is_better: false,
-            ..yardstick("steps to the flag", "", 0, |row| f64::from(row.steps))
+        SwingUp::NAME => Yardstick {
+            word: "height",
+            name: "mean height",
+            unit: "",
+            range: Some((-1.0, 1.0)),
+            of: |row| tallied(row, 0),
+            ..balance
         },
-        _ => yardstick("balance time", "s", 2, |row| row.duration_s),
+        SpeedUp::NAME => Yardstick {
+            word: "speed",
+            name: "mean speed",
+            unit: "m/s",
+            decimals: 3,
+            of: |row| tallied(row, 0),
+            ..balance
+        },
+        MountainCar::NAME => Yardstick {
+            word: "steps",
+            name: "steps to the flag",
+            unit: "",
+            decimals: 0,
+            more_is_better: false,
+            of: |row| f64::from(row.steps),
+            ..balance
+        },
+        _ => balance,
     }
 }
 

@@ -65,6 +65,12 @@ impl Results {
         format!("{task} · {mode} · {learner} · {preset}   {subject} trial {trial:03}")
     }
 
+    /// Whether this was a session of `task`.
+    #[must_use]
+    pub fn is_of(&self, task: &str) -> bool {
+        self.task == task
+    }
+
     /// The number by which its rollouts are judged.
     #[must_use]
     pub fn yardstick(&self) -> Yardstick {

@@ -20,7 +20,8 @@ use crate::profile::{self, Document, Order, ProfileError};
 use crate::record::folder;
 use crate::session::Phase;
 use crate::session::plan::Plan;
-use crate::sharing::Mode;
+use crate::sharing::{self, Mode};
+use crate::task::balance::Balance;
 use crate::tui::app::{self, Conductor, End, Running, Start};
 use crate::tui::live::Info;
 use crate::tui::results;
@@ -270,6 +271,11 @@ fn info(session: &Session) -> Info {
         autonomous_hold_s: profile.session.autonomous_hold_s,
         break_s: profile.session.break_s,
         gate: profile.sharing.gate,
+        // Standing still alone scores 0.69 at balance: with the thesis's window the gate
+        // waits for enough steps, whatever they are.
+        gate_is_timer: profile.sharing == sharing::Params::default()
+            && profile.experiment.name() == Balance::NAME,
+        by_episode: profile.sharing.window_episodes.is_some(),
         action_limit: task.action_limit(),
         action_unit: profile.experiment.action_unit().to_owned(),
         scene: Scene::of(&profile.experiment),
@@ -299,7 +305,8 @@ fn results_info(finished: &Finished) -> results::Info {
         files,
         summary,
         evaluation: (!finished.tenths.is_empty()).then(|| finished.tenths.clone()),
-        measure: results::Measure::BALANCE_TIME,
-        start: Some(results::Start::RELEASE),
+        measure: results.yardstick(),
+        start: results.is_of(Balance::NAME).then_some(results::Start::RELEASE),
+        regions: results.phases.main.as_ref().map_or_else(Vec::new, |main| main.regions.clone()),
     }
 }

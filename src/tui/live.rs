@@ -1,5 +1,6 @@
 //! The live screen: the plant at a glance, the session's state in fixed places below it.
 
+mod facts;
 mod map;
 mod overlay;
 mod panels;
@@ -48,8 +49,13 @@ pub struct Info {
     pub autonomous_hold_s: f64,
     /// The break between phases, s.
     pub break_s: f64,
-    /// The success at which the robot begins to take over.
+    /// The success at which the robot begins to take over; 0 where there is no gate.
     pub gate: f64,
+    /// Whether the gate is but a timer: success counts from nothing over a window that is
+    /// longer than any rollout.
+    pub gate_is_timer: bool,
+    /// Whether shares move once an episode.
+    pub by_episode: bool,
     /// The largest action.
     pub action_limit: f64,
     /// The action's unit, one or two characters.
@@ -297,11 +303,13 @@ fn notes(info: &Info) -> Vec<String> {
     let gate = super::text::fixed(info.gate * 100.0, 0, 0);
     let mut notes = Vec::new();
     if !info.robot_watches && info.gate > 0.0 {
-        notes.push(format!(
-            "The robot begins to take over when success reaches {gate} %. With the thesis's \
-             window of 4000 steps that is a timer of about 2,300–2,600 steps rather than a \
-             test of skill."
-        ));
+        let timer = if info.gate_is_timer {
+            " With the thesis's window of 4000 steps that is a timer of about 2,300–2,600 steps \
+             rather than a test of skill."
+        } else {
+            ""
+        };
+        notes.push(format!("The robot begins to take over when success reaches {gate} %.{timer}"));
     }
     if !info.operator.is_empty() {
         notes.push(format!("Steered by {}.", info.operator));

@@ -5,7 +5,7 @@
 mod charts;
 mod measure;
 
-pub use measure::{Measure, Start};
+pub use measure::Start;
 
 use ratatui::Frame;
 
@@ -15,11 +15,13 @@ use super::pen::{Pen, columns};
 use super::text::{cut, fixed, mean, real};
 use super::{help, live, small};
 use crate::record::EpisodeRow;
-use crate::report::metrics;
+use crate::report::achieved::{Yardstick, yardstick};
+use crate::report::metrics::{self, RegionEnd};
 use crate::session::Phase;
+use crate::task::balance::Balance;
 
 /// What a session came to.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Info {
     /// Its title, such as "balance · simultaneous · rfwr · S07 trial 002".
     pub title: String,
@@ -36,9 +38,28 @@ pub struct Info {
     /// The robot alone after each tenth of main: percent of main, mean of the measure.
     pub evaluation: Option<Vec<(u8, f64)>>,
     /// What rollouts are measured by.
-    pub measure: Measure,
+    pub measure: Yardstick,
     /// How rollouts began; `None` where they all begin alike.
     pub start: Option<Start>,
+    /// How main ended in each region, where there are several.
+    pub regions: Vec<RegionEnd>,
+}
+
+impl Default for Info {
+    fn default() -> Self {
+        Self {
+            title: String::new(),
+            finish: String::new(),
+            rollouts: Vec::new(),
+            folder: String::new(),
+            files: Vec::new(),
+            summary: Vec::new(),
+            evaluation: None,
+            measure: yardstick(Balance::NAME),
+            start: None,
+            regions: Vec::new(),
+        }
+    }
 }
 
 impl Info {
@@ -49,12 +70,12 @@ impl Info {
 
     /// The measure of the rollouts of `phase` that count.
     fn measured(&self, phase: Phase) -> Vec<f64> {
-        self.of(phase).map(self.measure.value).collect()
+        self.of(phase).map(self.measure.of).collect()
     }
 
     /// The pages' titles.
     const fn pages(&self) -> [&'static str; PAGES] {
-        [self.measure.page, "sharing", "robot alone", "files"]
+        [self.measure.word, "sharing", "robot alone", "files"]
     }
 }
 
@@ -149,7 +170,12 @@ fn draw_page(pen: &mut Pen<'_>, info: &Info, page: usize) {
             charts::measured(&mut pen.part(0, 0, width, chart), info);
             write(&mut pen.part(0, chart, width, height - chart), &lines);
         }
-        1 => charts::sharing(pen, info),
+        1 => {
+            let lines = regions(info);
+            let chart = height.saturating_sub(u16::try_from(lines.len()).unwrap_or(0));
+            charts::sharing(&mut pen.part(0, 0, width, chart), info);
+            write(&mut pen.part(0, chart, width, height - chart), &lines);
+        }
         2 => {
             let lines = statistics(info, &[Phase::Autonomous, Phase::ZeroControl]);
             let chart = height.saturating_sub(u16::try_from(lines.len()).unwrap_or(0));
@@ -162,7 +188,7 @@ fn draw_page(pen: &mut Pen<'_>, info: &Info, page: usize) {
 
 /// A line for each of `phases` that took place: its measure.
 fn statistics(info: &Info, phases: &[Phase]) -> Vec<String> {
-    let (unit, decimals) = (info.measure.unit, info.measure.decimals + 2);
+    let (unit, decimals) = (info.measure.unit, info.measure.decimals);
     let line = |phase: &Phase| {
         let values = info.measured(*phase);
         let average = mean(&values)?;
@@ -178,6 +204,23 @@ fn statistics(info: &Info, phases: &[Phase]) -> Vec<String> {
         Some(line.trim_end().to_owned())
     };
     phases.iter().filter_map(line).collect()
+}
+
+/// How main ended in each region, slow beside fast.
+fn regions(info: &Info) -> Vec<String> {
+    let one = |region: &RegionEnd| {
+        format!(
+            "{:<12}share {} % success {} %",
+            region.name.replace('_', " "),
+            fixed(100.0 * region.share, 3, 0),
+            fixed(100.0 * region.success, 3, 0)
+        )
+    };
+    info.regions
+        .chunks(2)
+        .rev()
+        .map(|pair| pair.iter().map(one).collect::<Vec<_>>().join("   "))
+        .collect()
 }
 
 fn write(pen: &mut Pen<'_>, lines: &[String]) {

@@ -65,6 +65,46 @@ impl Scene {
     }
 }
 
+/// The state of a small picture that moves gently, `time_s` after it began: what the task is
+/// about, at a glance.
+#[must_use]
+pub fn preview(experiment: &Experiment, time_s: f64) -> [f64; 4] {
+    use std::f64::consts::{PI, TAU};
+    /// How long the pole's or the car's way up takes, and how long it then stays, s.
+    const WAY: f64 = 6.0;
+    const STAY: f64 = 2.0;
+    let part = (time_s.rem_euclid(WAY + STAY) / WAY).min(1.0);
+    match experiment {
+        Experiment::Balance { plant, rules, .. } => {
+            let swing = (1.4 * time_s + 0.5).sin();
+            let reach = plant.track_length_m.unwrap_or(1.0) / 2.0;
+            // The cart hurries to where the pole falls.
+            let lean = (1.4 * time_s + 1.1).sin() * rules.fail_deg.to_radians();
+            [0.4 * reach * swing, 0.0, 0.4 * lean, 0.0]
+        }
+        // Three swings, each higher; then it stands.
+        Experiment::SwingUp { plant, .. } => {
+            let swing = (3.0 * TAU * part).sin();
+            let angle = PI - PI * part.powi(2) - 0.9 * swing * part.sqrt() * (1.0 - part);
+            let reach = plant.track_length_m.unwrap_or(1.0) / 2.0;
+            [-0.4 * reach * swing * (1.0 - part), 0.0, angle, 4.0 * swing * (1.0 - part)]
+        }
+        // The beam tilts against the ball.
+        Experiment::SpeedUp { plant, rules, .. } => {
+            let phase = 2.0 * time_s;
+            let tilt = -0.6 * plant.servo_limit_rad * phase.sin();
+            [0.8 * rules.limit_m * phase.sin(), 0.25 * phase.cos(), tilt, 0.0]
+        }
+        // Two swings in the valley, then up to the flag.
+        Experiment::MountainCar { plant, .. } => {
+            let valley = -std::f64::consts::FRAC_PI_6;
+            let swing = (2.5 * TAU * part).sin() * part;
+            let x = valley + (plant.goal - valley) * part.powi(4) - 0.5 * swing * (1.0 - part);
+            [x, 0.05 * (2.5 * TAU * part).cos() * (1.0 - part), 0.0, 0.0]
+        }
+    }
+}
+
 /// The map of the regions, for the task that has several.
 #[must_use]
 pub fn regions_of(experiment: &Experiment) -> Option<regions::Borders> {

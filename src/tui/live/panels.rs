@@ -1,11 +1,11 @@
 //! The numbers below the scene: who has the controls on the left, how it goes on the right.
 
-use super::View;
+use super::{View, facts};
 use crate::session::Phase;
 use crate::session::machine::Stage;
 use crate::tui::palette::Role;
-use crate::tui::pen::{Pen, columns};
-use crate::tui::text::{count, fixed, mean, place, signed, sparkline};
+use crate::tui::pen::Pen;
+use crate::tui::text::{fixed, place, signed, sparkline};
 
 /// The right part's width.
 const RIGHT: u16 = 31;
@@ -18,7 +18,7 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
     let left = width.saturating_sub(RIGHT);
     sharing(&mut pen.part(0, 0, left, height), view);
     actions(&mut pen.part(0, 2, left, height), view);
-    facts(&mut pen.part(left, 0, RIGHT, height), view);
+    facts::draw(&mut pen.part(left, 0, RIGHT, height), view);
 }
 
 /// The share's bar, and success with the gate.
@@ -61,28 +61,59 @@ fn sharing(pen: &mut Pen<'_>, view: &View<'_>) {
     }
 }
 
-/// Success over the session, its value, and where the gate is.
+/// Success over the session, its value, and where the gate is; of several regions a bar for
+/// each.
 fn success(pen: &mut Pen<'_>, view: &View<'_>) {
     let now = view.panel.successes.get(view.panel.region).copied().unwrap_or(0.0);
     let is_wide = pen.width() >= 80;
     let end = pen.width().saturating_sub(if is_wide { 37 } else { 19 });
     let spark = end.saturating_sub(VALUES + 7);
     pen.text(1, 0, "success", Role::Text);
-    let bars = sparkline(&view.history.success, spark.into(), 1.0);
-    pen.text(VALUES, 0, &bars, Role::Text);
+    if view.info.regions.is_some() {
+        regions(pen, view);
+    } else {
+        let bars = sparkline(&view.history.success, spark.into(), 1.0);
+        pen.text(VALUES, 0, &bars, Role::Text);
+    }
     pen.text(VALUES + spark, 0, &format!("{} %", fixed(now * 100.0, 4, 0)), Role::Strong);
     if view.info.robot_watches {
         return;
     }
-    let (words, role) = match view.panel.gate {
-        Some(opened) => {
-            let tau = fixed(opened.tau, 0, 0);
-            let words = if is_wide { "gate opened at step" } else { "open" };
-            (format!("{words} {}, τ {tau}", opened.step), Role::Robot)
-        }
-        None => (format!("gate {} %: not yet", fixed(view.info.gate * 100.0, 0, 0)), Role::Dim),
-    };
+    let (words, role) = gate(view, is_wide);
     pen.text(end, 0, &words, role);
+}
+
+/// The success of each region, a bar of one cell, slow beside fast: top, middle, down.
+fn regions(pen: &mut Pen<'_>, view: &View<'_>) {
+    let successes = &view.panel.successes;
+    let mut x = VALUES;
+    for (word, first) in [("T", 4), ("M", 2), ("D", 0)] {
+        let pair = successes.get(first..first + 2).unwrap_or_default();
+        x = pen.text(x, 0, word, Role::Dim);
+        x = pen.text(x, 0, &sparkline(pair, 2, 1.0), Role::Text) + 1;
+    }
+}
+
+/// Whether the robot may take over here, in words.
+fn gate(view: &View<'_>, is_wide: bool) -> (String, Role) {
+    let region = view.panel.region;
+    if view.panel.frozen.get(region).copied().unwrap_or(false) {
+        return ("handed over".to_owned(), Role::Robot);
+    }
+    if view.info.gate <= 0.0 {
+        return (String::new(), Role::Dim);
+    }
+    let Some(opened) = view.panel.gate else {
+        let gate = fixed(view.info.gate * 100.0, 0, 0);
+        return (format!("gate {gate} %: not yet"), Role::Dim);
+    };
+    let tau = fixed(opened.tau, 0, 0);
+    let words = match (is_wide, view.info.by_episode) {
+        (true, true) => "gate opened at episode",
+        (true, false) => "gate opened at step",
+        (false, _) => "open",
+    };
+    (format!("{words} {}, τ {tau}", opened.step), Role::Robot)
 }
 
 /// Three bars around zero: what you want, what the robot wants, what the motor gets.
@@ -120,58 +151,10 @@ fn action(
             let cells = place((part.abs() * f64::from(half)).round());
             let from = if part < 0.0 { zero.saturating_sub(cells) } else { zero + 1 };
             pen.repeat(from, y, glyph, cells, role);
-            format!("{} {unit}", signed(value, 6, 1))
+            let decimals = if view.info.action_limit > 5.0 { 1 } else { 2 };
+            format!("{} {unit}", signed(value, 6, decimals)).trim_end().to_owned()
         }
         Err(word) => word.to_owned(),
     };
     pen.text_until(pen.width().saturating_sub(2), y, &words, Role::Text);
-}
-
-/// Two columns of labelled numbers.
-fn facts(pen: &mut Pen<'_>, view: &View<'_>) {
-    let seen = view.panel;
-    let durations = view.history.durations(view.phase());
-    let now = seen.stage.moment().map_or(0.0, |m| f64::from(m.step) * view.info.tick_s);
-    let best = durations.iter().copied().fold(f64::NAN, f64::max);
-    let last = &durations[durations.len().saturating_sub(10)..];
-    let longest = last.iter().copied().fold(1.0, f64::max);
-    left(pen, 0, "balance", &format!("{} s", fixed(now, 6, 2)), Role::Strong);
-    right(pen, 0, "best", &format!("{} s", fixed(best, 6, 2)));
-    pen.text(0, 1, "last 10", Role::Dim);
-    pen.text(8, 1, &sparkline(last, 10, longest), Role::Text);
-    let recent = mean(last).unwrap_or(f64::NAN);
-    pen.text_until(30, 1, &format!("mean {}", fixed(recent, 5, 2)), Role::Text);
-
-    let number = |index: usize| seen.state.get(index).copied().unwrap_or(f64::NAN).to_degrees();
-    left(pen, 2, "angle", &format!("{}°", signed(number(2), 6, 1)), Role::Text);
-    right(pen, 2, "speed", &format!("{} °/s", signed(number(3), 4, 0)));
-    let fields = format!("{:>4}/{}", seen.fields, view.info.field_cap);
-    left(pen, 3, "fields", &fields, Role::Text);
-    right(pen, 3, "learned", &count(seen.learned, 6));
-    let tick = view.info.tick_s * 1e3;
-    left(pen, 4, "tick", &format!("{} ms", fixed(tick, 5, 0)), Role::Text);
-    if seen.lost_rows > 0 {
-        right_as(pen, "rows lost", &count(seen.lost_rows, 5));
-    } else if seen.missed > 0 {
-        right_as(pen, "missed", &count(seen.missed, 6));
-    } else {
-        right(pen, 4, "late", &format!("{} ms", fixed(seen.lateness.0 * 1e3, 5, 1)));
-    }
-}
-
-fn left(pen: &mut Pen<'_>, y: u16, label: &str, value: &str, role: Role) {
-    pen.text(0, y, label, Role::Dim);
-    pen.text_until(15, y, value, role);
-}
-
-fn right(pen: &mut Pen<'_>, y: u16, label: &str, value: &str) {
-    pen.text(17, y, label, Role::Dim);
-    pen.text_until(30, y, value, Role::Text);
-}
-
-/// Trouble, in the place of the lateness.
-fn right_as(pen: &mut Pen<'_>, label: &str, value: &str) {
-    let label = format!("{label} {value}");
-    let x = 30_u16.saturating_sub(columns(&label));
-    pen.text(x, 4, &label, Role::Alarm);
 }

@@ -6,8 +6,9 @@ use ratatui::text::Line;
 use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Widget};
 
 use super::Info;
-use super::measure::Measure;
+use super::measure::{axis_decimals, title, title_alone};
 use crate::record::EpisodeRow;
+use crate::report::achieved::Yardstick;
 use crate::session::Phase;
 use crate::tui::palette::{Glyphs, Role};
 use crate::tui::pen::{Pen, columns};
@@ -15,9 +16,9 @@ use crate::tui::text::{moving_mean, real};
 
 impl Scale {
     /// An axis for `values` of `measure`.
-    fn of(measure: &Measure, title: String, values: impl Iterator<Item = f64>) -> Self {
-        let (from, to) = measure.axis(values);
-        Self { title, from, to, decimals: measure.decimals }
+    fn of(measure: &Yardstick, title: String, values: impl Iterator<Item = f64>) -> Self {
+        let (from, to) = super::measure::axis(measure, values);
+        Self { title, from, to, decimals: axis_decimals(measure) }
     }
 
     /// An axis of rollouts up to the `last`.
@@ -94,7 +95,7 @@ pub fn measured(pen: &mut Pen<'_>, info: &Info) {
     ];
     let x = Scale::rollouts("rollout", count);
     let all = practice.iter().chain(&main).copied();
-    let y = Scale::of(&info.measure, info.measure.title(), all);
+    let y = Scale::of(&info.measure, title(&info.measure), all);
     chart(pen, &curves, &x, &y);
 }
 
@@ -144,7 +145,7 @@ fn starts(pen: &mut Pen<'_>, info: &Info) {
         let at = |row: &EpisodeRow| {
             info.start.map_or_else(|| f64::from(row.episode), |start| (start.value)(row))
         };
-        info.of(phase).map(|row| (at(row), (info.measure.value)(row))).collect()
+        info.of(phase).map(|row| (at(row), (info.measure.of)(row))).collect()
     };
     let (robot, nobody) = (points(Phase::Autonomous), points(Phase::ZeroControl));
     let all = || robot.iter().chain(&nobody);
@@ -153,7 +154,7 @@ fn starts(pen: &mut Pen<'_>, info: &Info) {
         Some(start) => Scale { title: start.title(), from: -widest, to: widest, decimals: 1 },
         None => Scale::rollouts("rollout", widest),
     };
-    let title = info.measure.title_alone();
+    let title = title_alone(&info.measure);
     let y = Scale::of(&info.measure, title, all().map(|point| point.1));
     let curves = [
         Curve { name: "nobody", graph: GraphType::Scatter, role: Role::Dim, points: nobody },
@@ -162,9 +163,9 @@ fn starts(pen: &mut Pen<'_>, info: &Info) {
     chart(pen, &curves, &x, &y);
 }
 
-fn learning(pen: &mut Pen<'_>, measure: &Measure, tenths: &[(u8, f64)]) {
+fn learning(pen: &mut Pen<'_>, measure: &Yardstick, tenths: &[(u8, f64)]) {
     let points: Points = tenths.iter().map(|(part, value)| (f64::from(*part), *value)).collect();
-    let y = Scale::of(measure, measure.title_alone(), points.iter().map(|point| point.1));
+    let y = Scale::of(measure, title_alone(measure), points.iter().map(|point| point.1));
     let curves = [Curve { name: "robot, mean", graph: GraphType::Line, role: Role::Robot, points }];
     let x = Scale { title: "% of main".to_owned(), from: 0.0, to: 100.0, decimals: 0 };
     chart(pen, &curves, &x, &y);

@@ -12,7 +12,7 @@ use crate::session::plan::Wanted;
 use crate::tui::keys::Screen;
 use crate::tui::palette::{Look, Role};
 use crate::tui::pen::Pen;
-use crate::tui::scene::{self, cart_pole};
+use crate::tui::scene::{self, Scene};
 use crate::tui::text::{cut, fixed, signed, wrapped};
 use crate::tui::{help, small};
 
@@ -296,31 +296,35 @@ impl View<'_> {
         }
     }
 
-    /// The plant at its chosen length, gently moving.
+    /// The plant at its chosen measures, gently moving; where there is room all tasks', the
+    /// chosen one in a frame.
     fn picture(&self, pen: &mut Pen<'_>, height: u16) {
         const ROOMY: u16 = 112;
-        let mut part = if pen.width() >= ROOMY {
-            let width = pen.width() - FORM - 3;
-            pen.part(FORM + 2, 2, width, (height - 10).min(20))
-        } else {
-            pen.part(BESIDE + 1, 12, pen.width() - BESIDE - 2, 6)
-        };
-        match &self.setup.profile.experiment {
-            Experiment::Balance { plant, rules, .. } => {
-                let geometry = cart_pole::Geometry {
-                    pole_length_m: plant.pole_length_m,
-                    track_length_m: plant.track_length_m,
-                    fail_angle_rad: Some(rules.fail_deg.to_radians()),
-                };
-                let swing = (1.4 * self.extras.time_s + 0.5).sin();
-                let reach = plant.track_length_m.unwrap_or(1.0) / 2.0;
-                // The cart hurries to where the pole falls.
-                let lean = (1.4 * self.extras.time_s + 1.1).sin() * rules.fail_deg.to_radians();
-                let state = [0.4 * reach * swing, 0.0, 0.4 * lean, 0.0];
-                cart_pole::draw(&mut part, &geometry, &state, scene::Light::Go);
-            }
-            _ => {}
+        let chosen = &self.setup.profile.experiment;
+        if pen.width() < ROOMY {
+            let mut part = pen.part(BESIDE + 1, 12, pen.width() - BESIDE - 2, 6);
+            self.moving(&mut part, chosen);
+            return;
         }
+        let all = Experiment::all();
+        let count = u16::try_from(all.len()).unwrap_or(1);
+        let (x, width, each) = (FORM + 2, pen.width() - FORM - 3, (height - 10).min(32) / count);
+        for (one, row) in all.iter().zip(0..) {
+            let is_chosen = one.name() == chosen.name();
+            let mut part = pen.part(x, 2 + row * each, width, each);
+            if is_chosen {
+                self.moving(&mut part.boxed(one.name(), Role::Strong), chosen);
+            } else {
+                part.text(2, 0, one.name(), Role::Dim);
+                let (width, height) = (part.width(), part.height());
+                self.moving(&mut part.part(1, 1, width - 2, height - 2), one);
+            }
+        }
+    }
+
+    fn moving(&self, pen: &mut Pen<'_>, experiment: &Experiment) {
+        let state = scene::preview(experiment, self.extras.time_s);
+        Scene::of(experiment).draw(pen, &state, scene::Light::Go);
     }
 
     /// Below the form: changes, what is asked or wrong, and the equal command.
