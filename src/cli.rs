@@ -35,7 +35,7 @@ pub struct Cli {
 pub enum Command {
     /// One session: introduction, main, autonomous.
     Run(Box<Run>),
-    /// Let a recorded policy act alone over many starts.
+    /// Let recorded policies act alone over many starts, and nobody on the same ones.
     Evaluate(Evaluate),
     /// A learner on a table or a recorded session, offline.
     Fit(Fit),
@@ -107,17 +107,23 @@ pub struct Run {
 /// The words of `evaluate`.
 #[derive(Args, Debug)]
 pub struct Evaluate {
-    /// A policy file, or the folder of a session, whose final policy it is then.
+    /// A policy file, or the folder of a session: its final policy, and those of its tenths.
     pub policy: PathBuf,
     /// The profile whose plant and rules apply [default: the session's, or the task's].
     #[arg(long, value_name = "PROFILE")]
     pub profile: Option<String>,
-    /// The number of starts, on a grid [default: the profile's].
+    /// The number of starts [default: the profile's].
     #[arg(long, value_name = "N")]
     pub starts: Option<u32>,
-    /// The seed of the plant's noise.
+    /// Starts drawn at random in place of the profile's.
+    #[arg(long)]
+    pub random: bool,
+    /// The seed of the plant's noise, and of random starts.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Change a value of the profile, such as `plant.pole_length_m=0.6`.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
     /// Print one JSON object instead of sentences.
     #[arg(long)]
     pub json: bool,

@@ -24,6 +24,8 @@ pub enum Purpose {
     EvaluationStarts = 5,
     /// The assignment of subjects to modes.
     Assignment = 6,
+    /// Resampling for intervals.
+    Bootstrap = 7,
 }
 
 /// The place of a rollout within a session.

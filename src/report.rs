@@ -2,3 +2,4 @@
 
 pub mod achieved;
 pub mod metrics;
+pub mod spread;

@@ -1,6 +1,7 @@
 //! The composition root: the one room that knows every other.
 
 mod choose;
+mod evaluate;
 mod fit;
 pub mod outcome;
 mod screen;
@@ -62,7 +63,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         None => screen::screen(None),
         Some(Command::Run(run)) if run.headless => headless(run),
         Some(Command::Run(run)) => screen::screen(Some(run)),
-        Some(Command::Evaluate(evaluate)) => words::evaluate(evaluate),
+        Some(Command::Evaluate(words)) => evaluate::evaluate(words),
         Some(Command::Fit(words)) => fit::fit(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::Profile(profile)) => words::profile(profile),

@@ -440,8 +440,25 @@ fn evaluate_repeats_the_autonomous_phase_and_takes_other_starts() {
     }
     let file = evaluate(&format!("{SIMULTANEOUS}/policy-010.json --starts 9"));
     assert_eq!((&file["schema"], &file["episodes"]), (&1.into(), &9.into()));
+    assert_eq!(file.get("tenths"), None);
     let sentence = desk.succeed(&format!("evaluate {SIMULTANEOUS} --starts 3"));
     assert!(sentence.contains("3 rollouts"), "{sentence}");
+
+    // Nobody on the same starts, and every tenth, as the session itself had them.
+    let zero = &session["zero_control"]["mean_balance_s"];
+    assert_eq!(zero, &json["phases"]["zero_control"]["mean_balance_s"]);
+    let tenths = session["tenths"].as_array().unwrap();
+    assert_eq!(tenths.len(), 10);
+    assert_eq!(tenths[9]["mean_balance_s"], session["mean_balance_s"]);
+    assert_eq!(tenths[0]["improvement_percent"], 0.0);
+    let interval: Vec<f64> =
+        session["interval95"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+    let mean = session["mean_balance_s"].as_f64().unwrap();
+    assert!(interval[0] <= mean && mean <= interval[1]);
+    let random = evaluate(&format!("{SIMULTANEOUS} --starts 9 --random --seed 3"));
+    assert_eq!(random["starts"], "random");
+    let start = |k: usize| random["rollouts"][k]["start"].as_f64().unwrap();
+    assert!(start(0) != start(1) && start(0).abs() < 0.0873);
 }
 
 #[test]

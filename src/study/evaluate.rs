@@ -33,12 +33,32 @@ pub fn autonomous(
     seed: u64,
     is_enough: impl Fn() -> bool,
 ) -> Option<Vec<EpisodeRow>> {
+    alone(profile, learner, seed, &[Phase::Autonomous], is_enough)
+}
+
+/// The same, and then nobody on the same starts and noise.
+pub fn autonomous_and_nobody(
+    profile: &Profile,
+    learner: &Model,
+    seed: u64,
+    is_enough: impl Fn() -> bool,
+) -> Option<Vec<EpisodeRow>> {
+    alone(profile, learner, seed, &[Phase::Autonomous, Phase::ZeroControl], is_enough)
+}
+
+fn alone(
+    profile: &Profile,
+    learner: &Model,
+    seed: u64,
+    phases: &[Phase],
+    is_enough: impl Fn() -> bool,
+) -> Option<Vec<EpisodeRow>> {
     let tick = profile.tick();
     let mut session = profile.session.clone();
     session.phases = vec![Wanted::Autonomous];
     session.autonomous_hold_s = 0.0;
     let mut plan = Plan::new(&session, tick, seed, false);
-    plan.phases.retain(|plan| plan.phase == Phase::Autonomous);
+    plan.phases.retain(|plan| phases.contains(&plan.phase));
     let rules = Rules {
         plan,
         tick,

@@ -1,0 +1,66 @@
+//! How sure a mean is: the median beside it, and a 95 % interval.
+
+use rand::RngExt;
+
+use super::metrics::mean;
+use crate::random::{Place, Purpose, stream};
+
+/// Resamples of the bootstrap.
+const RESAMPLES: usize = 2000;
+
+/// The middle of `values`; none of nothing.
+#[must_use]
+pub fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let half = sorted.len() / 2;
+    let upper = *sorted.get(half)?;
+    let is_odd = sorted.len() % 2 == 1;
+    Some(if is_odd { upper } else { f64::midpoint(*sorted.get(half - 1)?, upper) })
+}
+
+/// The 95 % interval of the mean of `values` by the percentile bootstrap (Efron 1979), with
+/// chance of its own; none below two values.
+#[must_use]
+pub fn interval95(values: &[f64]) -> Option<(f64, f64)> {
+    if values.len() < 2 {
+        return None;
+    }
+    let mut chance = stream(0, Purpose::Bootstrap, Place::default());
+    let mut means: Vec<f64> = (0..RESAMPLES)
+        .map(|_| {
+            let drawn: Vec<f64> = (0..values.len())
+                .filter_map(|_| values.get(chance.random_range(0..values.len())).copied())
+                .collect();
+            mean(&drawn)
+        })
+        .collect();
+    means.sort_by(f64::total_cmp);
+    let at = |part: usize| means.get(RESAMPLES * part / 1000).copied();
+    Some((at(25)?, at(975)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_the_middle() {
+        assert_eq!(median(&[]), None);
+        assert_eq!(median(&[3.0]), Some(3.0));
+        assert_eq!(median(&[9.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&[4.0, 1.0, 2.0, 9.0]), Some(3.0));
+    }
+
+    /// Of 100 equally spaced values the mean's standard error is 28.87 / 10, so the interval
+    /// is about 50.5 ± 5.66.
+    #[test]
+    fn the_interval_is_that_of_the_mean() {
+        let values: Vec<f64> = (1..=100).map(f64::from).collect();
+        let (low, high) = interval95(&values).unwrap();
+        assert!((low - 44.84).abs() < 0.6 && (high - 56.16).abs() < 0.6, "{low} {high}");
+        assert_eq!(interval95(&values), Some((low, high)), "the same each time");
+        assert_eq!(interval95(&[7.0, 7.0, 7.0]), Some((7.0, 7.0)));
+        assert_eq!(interval95(&[7.0]), None);
+    }
+}

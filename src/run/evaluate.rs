@@ -1,0 +1,274 @@
+//! `coadapt evaluate`: policies alone over many starts, beside nobody on the same ones.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use serde::Serialize;
+
+use super::shutdown::Shutdown;
+use super::words::{document, read, usage};
+use super::{RunError, say, signal_code, tell};
+use crate::cli;
+use crate::learner::{Learner, Model};
+use crate::profile::{Document, Profile};
+use crate::record::{self, EpisodeRow, Policy, policy};
+use crate::report::achieved::{Yardstick, yardstick};
+use crate::report::metrics::{self, Measures};
+use crate::report::spread::{interval95, median};
+use crate::session::Phase;
+use crate::study::evaluate as evaluation;
+
+/// What `evaluate --json` prints.
+#[derive(Serialize)]
+struct Evaluation {
+    schema: u32,
+    policy: String,
+    profile: String,
+    task: String,
+    preset: String,
+    seed: u64,
+    /// `grid` or `random`.
+    starts: String,
+    #[serde(flatten)]
+    alone: Alone,
+    /// Nobody, on the same starts and noise.
+    zero_control: Alone,
+    /// The policies of a session's tenths (figs 37 and 38).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    tenths: Vec<Tenth>,
+    rollouts: Vec<serde_json::Value>,
+}
+
+/// What a policy, or nobody, came to.
+#[derive(Serialize)]
+struct Alone {
+    #[serde(flatten)]
+    measures: Measures,
+    /// The median of the task's yardstick over the rollouts,
+    median: Option<f64>,
+    /// and the 95 % interval of its mean (percentile bootstrap over the rollouts).
+    interval95: Option<(f64, f64)>,
+}
+
+/// What the policy after a tenth of main came to.
+#[derive(Serialize)]
+struct Tenth {
+    percent: u8,
+    #[serde(flatten)]
+    alone: Alone,
+    /// By how much it is better than the first, in percent of the first; none where the
+    /// yardstick may be negative.
+    improvement_percent: Option<f64>,
+}
+
+/// A policy and the rules that it is tried by.
+struct Trial {
+    file: PathBuf,
+    folder: Option<PathBuf>,
+    policy: Policy<Model>,
+    profile: Profile,
+    shown: String,
+}
+
+pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
+    let trial = Trial::of(words)?;
+    let shutdown = Shutdown::listen();
+    let interrupted = || shutdown.signal().is_some();
+    let profile = &trial.profile;
+    let try_out = |learner: &Model| {
+        evaluation::autonomous_and_nobody(profile, learner, words.seed, interrupted)
+    };
+    let Some(rows) = try_out(&trial.policy.learner) else {
+        return Ok(signal_code(shutdown.signal().unwrap_or_default()));
+    };
+    let task = profile.experiment.name();
+    let mut tenths: Vec<Tenth> = Vec::new();
+    for (percent, learner) in trial.tenths() {
+        let tried = evaluation::autonomous(profile, &learner, words.seed, interrupted);
+        let Some(rows) = tried else {
+            return Ok(signal_code(shutdown.signal().unwrap_or_default()));
+        };
+        let Some(alone) = Alone::of(task, &rows, Phase::Autonomous) else { continue };
+        let first = tenths.first().map_or(&alone, |tenth| &tenth.alone).measures.achieved.mean();
+        let improvement_percent =
+            improvement(&yardstick(task), first, alone.measures.achieved.mean());
+        tenths.push(Tenth { percent, alone, improvement_percent });
+    }
+    let alone = Alone::of(task, &rows, Phase::Autonomous);
+    let nobody = Alone::of(task, &rows, Phase::ZeroControl);
+    let (Some(alone), Some(zero_control)) = (alone, nobody) else {
+        return Err(RunError::Failed("no rollout took place".to_owned()));
+    };
+    let starts = format!("{:?}", profile.session.starts).to_lowercase();
+    let evaluation = Evaluation {
+        schema: 1,
+        policy: trial.file.display().to_string(),
+        profile: trial.shown.clone(),
+        task: task.to_owned(),
+        preset: trial.policy.preset.clone(),
+        seed: words.seed,
+        starts,
+        alone,
+        zero_control,
+        tenths,
+        rollouts: rollouts(profile, &rows),
+    };
+    if words.json {
+        let json = serde_json::to_string(&evaluation);
+        say(&json.map_err(|error| RunError::Failed(error.to_string()))?)?;
+    } else {
+        say(&evaluation.sentences().join("\n"))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The robot's rollouts, the task's own measures by their names.
+fn rollouts(profile: &Profile, rows: &[EpisodeRow]) -> Vec<serde_json::Value> {
+    let names = profile.experiment.task(profile.tick()).tally_names();
+    metrics::rollouts_of(rows, Phase::Autonomous)
+        .filter_map(|row| {
+            let mut rollout = serde_json::to_value(row).ok()?;
+            let object = rollout.as_object_mut()?;
+            object.remove("tallied");
+            for (name, number) in names.iter().zip(row.tallied.iter()) {
+                object.insert((*name).to_owned(), (*number).into());
+            }
+            Some(rollout)
+        })
+        .collect()
+}
+
+impl Trial {
+    /// The policy that `words` name, and the profile: the given one, that of its session, or
+    /// the shipped one of its task and preset.
+    fn of(words: &cli::Evaluate) -> Result<Self, RunError> {
+        let is_session = words.policy.is_dir();
+        let file = if is_session { words.policy.join("policy.json") } else { words.policy.clone() };
+        let policy: Policy<Model> = record::read_policy(&file).map_err(usage)?;
+        let folder = file.parent().unwrap_or(Path::new("")).to_owned();
+        let sidecar = folder.join("session.json");
+        let mut document = match &words.profile {
+            Some(name) => document(name, &[])?,
+            None if is_session || sidecar.is_file() => {
+                let sidecar = record::read_sidecar(&sidecar).map_err(usage)?;
+                Document::from_text("session.json", sidecar.profile_ron)
+            }
+            None if policy.task == record::policy::TABLE => {
+                return Err(usage(format_args!(
+                    "{} was learned from a table, so no task is known: give --profile",
+                    file.display()
+                )));
+            }
+            None => {
+                let own = format!("{}-{}", policy.task, policy.preset);
+                let document = document(&own, &[]).or_else(|_| document(&policy.task, &[]))?;
+                tell(&format!("{}: the rules are those of {}", file.display(), document.shown()));
+                document
+            }
+        };
+        if let Some(starts) = words.starts {
+            document.set("session.autonomous_rollouts", &starts.to_string());
+        }
+        if words.random {
+            document.set("session.starts", "random");
+        }
+        for (key, value) in &words.set {
+            document.set(key, value);
+        }
+        let shown = document.shown().to_owned();
+        let profile = read(&document)?;
+        let features = profile.experiment.task(profile.tick()).feature_names();
+        let columns = (policy.learner.inputs(), policy.learner.outputs());
+        if let Some(misfit) = policy.misfit(profile.experiment.name(), features, columns) {
+            return Err(usage(format_args!(
+                "{}: {misfit}; give the profile that it was taught with: --profile, or --set",
+                file.display()
+            )));
+        }
+        let folder = is_session.then_some(folder);
+        Ok(Self { file, folder, policy, profile, shown })
+    }
+
+    /// The policies after the tenths of main, where a session holds them.
+    fn tenths(&self) -> Vec<(u8, Model)> {
+        let Some(folder) = &self.folder else { return Vec::new() };
+        (1..=10)
+            .filter_map(|tenth| {
+                let file = folder.join(policy::file_name(Some(tenth * 10)));
+                Some((tenth * 10, record::read_policy::<Model>(&file).ok()?.learner))
+            })
+            .collect()
+    }
+}
+
+impl Alone {
+    fn of(task: &str, rows: &[EpisodeRow], phase: Phase) -> Option<Self> {
+        let phases = metrics::phases(task, rows, None);
+        let measures = match phase {
+            Phase::ZeroControl => phases.zero_control,
+            _ => phases.autonomous,
+        }?;
+        let values: Vec<f64> = metrics::rollouts_of(rows, phase).map(yardstick(task).of).collect();
+        Some(Self { measures, median: median(&values), interval95: interval95(&values) })
+    }
+
+    /// In a sentence.
+    fn sentence(&self, yardstick: &Yardstick) -> String {
+        let decimals = yardstick.decimals;
+        let mut words = self.measures.sentence();
+        if let Some(median) = self.median {
+            words += &format!("; median {median:.decimals$}");
+        }
+        if let Some((low, high)) = self.interval95 {
+            words += &format!(", 95 % of the mean {low:.decimals$} to {high:.decimals$}");
+        }
+        words
+    }
+}
+
+impl Evaluation {
+    fn sentences(&self) -> Vec<String> {
+        let yardstick = yardstick(&self.task);
+        let Yardstick { name, unit, decimals, .. } = yardstick;
+        let mut lines = vec![
+            format!("robot alone  {}", self.alone.sentence(&yardstick)),
+            format!("nobody       {}", self.zero_control.sentence(&yardstick)),
+        ];
+        if !self.tenths.is_empty() {
+            let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
+            lines.push(format!("after each tenth of main: {name}{unit}"));
+        }
+        for tenth in &self.tenths {
+            let mean = tenth.alone.measures.achieved.mean();
+            let (low, high) = tenth.alone.interval95.unwrap_or((mean, mean));
+            let better = tenth
+                .improvement_percent
+                .map_or(String::new(), |percent| format!("   {percent:+.0} % on the first"));
+            lines.push(format!(
+                "{:>5} %  {mean:8.decimals$}   {low:.decimals$} to {high:.decimals$}{better}",
+                tenth.percent
+            ));
+        }
+        lines
+    }
+}
+
+/// By how much `value` is better than `first`, in percent of it.
+fn improvement(yardstick: &Yardstick, first: f64, value: f64) -> Option<f64> {
+    let gain = if yardstick.more_is_better { value - first } else { first - value };
+    (yardstick.range.is_none() && first > 0.0).then(|| 100.0 * gain / first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fewer_steps_are_better_and_heights_have_no_percent() {
+        let of = |task, first, value| improvement(&yardstick(task), first, value);
+        assert_eq!(of("balance", 2.0, 5.0), Some(150.0));
+        assert_eq!(of("mountain-car", 200.0, 100.0), Some(50.0));
+        assert_eq!(of("swing-up", 0.5, 0.9), None);
+        assert_eq!(of("speed-up", 0.0, 0.1), None);
+    }
+}
