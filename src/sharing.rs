@@ -321,4 +321,85 @@ mod tests {
         assert_eq!((s.share(0), s.success(0)), (1.0, 0.0));
         assert!(s.share(1) < 0.1);
     }
+
+    #[test]
+    fn a_region_is_handed_over_for_good_once_its_window_is_full() {
+        for freeze in [Freeze::Off, Freeze::Share, Freeze::ShareAndLearner] {
+            let params = Params {
+                window_steps: 400,
+                tau_steps: Some(10.0),
+                gate: 0.0,
+                window_fill: Fill::Partial,
+                freeze,
+                ..Params::default()
+            };
+            let mut s = Sharing::new(&params, Mode::Simultaneous, &WHOLE);
+            let froze: Vec<u32> = (1..=500).filter(|_| s.observe(0, 1.0).froze).collect();
+            // The share is low long before; the window is full at its 400th step.
+            assert_eq!(froze, if freeze == Freeze::Off { vec![] } else { vec![400] });
+            let low = s.share(0);
+            for _ in 0..800 {
+                s.observe(0, 0.0);
+            }
+            assert_eq!(s.success(0), 0.0, "success moves on");
+            assert_eq!(s.share(0) == low, freeze != Freeze::Off, "{freeze:?}");
+            assert_eq!(s.is_frozen(0), freeze != Freeze::Off);
+            assert_eq!(s.is_learner_frozen(0), freeze == Freeze::ShareAndLearner);
+        }
+    }
+
+    #[test]
+    fn who_only_watches_is_never_handed_anything() {
+        let params = Params {
+            window_steps: 5,
+            tau_steps: Some(2.0),
+            gate: 0.0,
+            freeze: Freeze::ShareAndLearner,
+            ..Params::default()
+        };
+        let mut s = Sharing::new(&params, Mode::Sequential, &WHOLE);
+        for _ in 0..100 {
+            s.observe(0, 1.0);
+        }
+        assert!(!s.is_frozen(0) && !s.is_learner_frozen(0));
+    }
+
+    /// Three episodes by hand: the gate at the second, τ = −2 / ln 0.5 or the floor.
+    #[test]
+    fn shares_by_episode_count_in_episodes() {
+        for (floor, tau) in [(1.0, 2.0 / std::f64::consts::LN_2), (20.0, 20.0)] {
+            let params = Params {
+                window_episodes: Some(2),
+                window_fill: Fill::Partial,
+                gate: 0.5,
+                tau_floor_episodes: floor,
+                ..Params::default()
+            };
+            let mut s = Sharing::new(&params, Mode::Simultaneous, &WHOLE);
+            assert!(!s.observe(0, 0.3).gate_opened);
+            let second = s.observe(0, 0.9);
+            assert!(second.gate_opened && (second.success - 0.6).abs() < 1e-12);
+            let opened = s.gate(0).unwrap();
+            assert_eq!(opened.step, 2);
+            assert!((opened.tau - tau).abs() < 1e-12);
+            assert_eq!(s.share(0), 1.0);
+            s.observe(0, 0.7);
+            assert!((s.share(0) - (1.0 - 0.8 / tau)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn keys_of_the_other_pace_are_refused_with_what_to_do() {
+        let refused = |params: &Params| {
+            let mut faults = Vec::new();
+            params.check(&mut Checker::new(&mut faults));
+            faults.into_iter().map(|f| format!("{}: {}", f.key, f.allowed)).collect::<Vec<_>>()
+        };
+        let by_episode = Params { window_episodes: Some(20), ..Params::default() };
+        assert_eq!(refused(&by_episode), [""; 0]);
+        let wrong = refused(&Params { tau_steps: Some(9.0), ..by_episode });
+        assert!(wrong.len() == 1 && wrong[0].contains("tau_episodes counts there"), "{wrong:?}");
+        let wrong = refused(&Params { tau_episodes: Some(9.0), ..Params::default() });
+        assert!(wrong.len() == 1 && wrong[0].contains("tau_steps counts there"), "{wrong:?}");
+    }
 }

@@ -306,4 +306,40 @@ mod tests {
         assert_eq!(teacher.close(false, 0.0).unwrap().x[0], 50.0);
         assert_eq!(teacher.close(false, 0.0), None);
     }
+
+    mod properties {
+        use super::*;
+        use proptest::prelude::*;
+
+        proptest! {
+            /// Whatever the parameters, each tick's sample comes out once, in order, within
+            /// the allowed weights.
+            #[test]
+            fn every_sample_is_handed_out_once_and_in_order(
+                delay_s in 0.0..0.5_f64,
+                outcome_s in prop::option::of(0.001..0.5_f64),
+                outcome_least in 0.001..1.0_f64,
+                failed: bool,
+                costs in prop::collection::vec(-1e3..1e3_f64, 1..60),
+            ) {
+                let params = Params { delay_s, outcome_s, outcome_least, ..Params::default() };
+                let mut teacher = Teacher::new(&params, Seconds(0.02), &["all"]);
+                teacher.begin();
+                let mut lessons = Vec::new();
+                for (k, &cost) in (0..).zip(&costs) {
+                    let human = Intent::fresh(f64::from(k));
+                    lessons.extend(teacher.see(&Sight { cost, ..sight(k, human) }));
+                }
+                lessons.extend(std::iter::from_fn(|| teacher.close(failed, 0.0)));
+                let order: Vec<f64> = lessons.iter().map(|lesson| lesson.y).collect();
+                let expected: Vec<f64> = (0..).take(costs.len()).map(f64::from).collect();
+                prop_assert_eq!(order, expected);
+                for lesson in &lessons {
+                    let in_bounds = (outcome_least..=params.outcome_most).contains(&lesson.weight);
+                    prop_assert!(in_bounds || outcome_s.is_none() && lesson.weight == 1.0);
+                    prop_assert!(lesson.x[0] <= lesson.y, "no state of the future");
+                }
+            }
+        }
+    }
 }

@@ -250,6 +250,45 @@ fn a_session_refitted_with_its_own_settings_gives_its_policy_to_the_byte() {
     }
 }
 
+/// Delayed and weighted lessons, executed actions and frozen regions are found again in the
+/// rows of every task.
+#[test]
+fn modern_sessions_of_every_task_are_refitted_to_the_byte() {
+    for (profile, task, more) in [
+        ("balance-modern", "balance", "--rollouts 12"),
+        ("swing-up-modern", "swing-up", "--duration 90 --set teaching.outcome_s=0.3"),
+        (
+            "swing-up",
+            "swing-up",
+            "--duration 90 --set sharing.freeze=share_and_learner --set sharing.tau_steps=50 \
+             --set sharing.window_steps=50 --set teaching.target=executed",
+        ),
+        (
+            "speed-up-modern",
+            "speed-up",
+            "--duration 90 --set sharing.freeze=share_and_learner --set sharing.tau_steps=50",
+        ),
+        (
+            "mountain-car-modern",
+            "mountain-car",
+            "--rollouts 12 --set sharing.freeze=share_and_learner --set sharing.freeze_share=0.9 \
+             --set sharing.window_episodes=3 --set sharing.tau_floor_episodes=1",
+        ),
+    ] {
+        let desk = Desk::new();
+        desk.succeed(&format!(
+            "run {profile} --headless --operator simulated:average --seed 5 \
+             --phases introduction,main {more}"
+        ));
+        let folder = format!("logs/anon/001-{task}-simultaneous");
+        let events = fs::read_to_string(desk.at(&folder).join("events.csv")).unwrap();
+        assert!(events.contains("frozen") || !more.contains("freeze"), "{profile}: {events}");
+        desk.succeed(&format!("fit {folder} --out again.json --json"));
+        let recorded = fs::read(desk.at(&folder).join("policy.json")).unwrap();
+        assert_eq!(text(&fs::read(desk.at("again.json")).unwrap()), text(&recorded), "{profile}");
+    }
+}
+
 #[test]
 fn a_session_is_refitted_with_other_settings_and_without_its_discarded_rollouts() {
     let desk = Desk::new();

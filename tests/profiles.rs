@@ -73,6 +73,14 @@ fn the_plain_profiles_are_their_tasks_defaults() {
 }
 
 #[test]
+fn an_unknown_region_of_teaching_is_refused_with_the_regions() {
+    let text = "(task: \"swing-up\", teaching: (delay_regions: [\"top\"]))";
+    let message = message(&Document::from_text("x.ron", text));
+    assert!(message.contains("x.ron:1") && message.contains("teaching.delay_regions"), "{message}");
+    assert!(message.contains("down_slow, down_fast, middle_slow"), "{message}");
+}
+
+#[test]
 fn a_task_has_its_own_defaults_for_what_a_profile_leaves_out() {
     let short = read("(task: \"swing-up\", plant: (bounce: 0.1), sharing: (gate: 0.2))");
     let mut document = Document::find("swing-up", &nowhere()).unwrap();
@@ -238,7 +246,9 @@ fn names_and_paths_are_found_or_the_message_helps() {
     assert_eq!(find(at("mine.ron").to_str().unwrap()).unwrap().name(), "mine");
     let error = |name: &str| find(name).unwrap_err().to_string();
     assert!(error("balanse").contains("did you mean `balance`?"));
-    assert!(error("zzz").contains("the known ones are balance, binary, huge, mine"));
+    assert!(
+        error("zzz").contains("the known ones are balance, balance-modern, binary, huge, mine")
+    );
     assert!(error("").contains("the known ones"));
     assert!(error("./none.ron").contains("./none.ron cannot be read: No such file"));
     assert!(matches!(find("huge"), Err(ProfileError::TooLarge { .. })));

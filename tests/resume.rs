@@ -61,10 +61,13 @@ impl Running {
     }
 
     /// The same, as soon as `file` of the session holds `bytes`.
-    fn once(mut self, file: &str, bytes: u64, desk: &Desk) -> Self {
-        let file = desk.at(FOLDER).join(file);
+    fn once(self, file: &str, bytes: u64, desk: &Desk) -> Self {
+        self.once_in(&desk.at(FOLDER).join(file), bytes)
+    }
+
+    fn once_in(mut self, file: &Path, bytes: u64) -> Self {
         let mut clock = WallClock::start();
-        while fs::metadata(&file).map_or(0, |file| file.len()) < bytes {
+        while fs::metadata(file).map_or(0, |file| file.len()) < bytes {
             assert_eq!(self.0.try_wait().unwrap(), None, "over before {bytes} bytes");
             assert!(clock.now() < Seconds(60.0), "no {bytes} bytes in a minute");
             clock.wait_until(clock.now() + Seconds(0.001));
@@ -137,6 +140,49 @@ fn is_killed_and_goes_on(part: f64) {
     Running::until(&desk, bytes(part)).killed();
     assert_whole_rows(&desk.at(FOLDER));
     assert_goes_on(&desk);
+}
+
+/// A session of `words` that is killed with half of its rows and goes on has the rows and
+/// policies of one that was never cut.
+fn goes_on_like_unbroken(task: &str, words: &str) {
+    let (whole, cut) = (Desk::new(), Desk::new());
+    let line = format!("run {task} --headless --seed 5 --json {words}");
+    let expected: Value = serde_json::from_str(&whole.succeed(&line)).unwrap();
+    let folder = format!("logs/anon/001-{task}-simultaneous");
+    let steps = |desk: &Desk| desk.at(&folder).join("steps.csv");
+    let half = fs::metadata(steps(&whole)).unwrap().len() / 2;
+    Running::start(&cut, &line).once_in(&steps(&cut), half).killed();
+    let resumed = cut.succeed(&format!("run --headless --json --resume {folder}"));
+    let mut resumed: Value = serde_json::from_str(&resumed).unwrap();
+    resumed["session"] = expected["session"].clone();
+    assert_eq!(resumed, expected, "{task}");
+    let replaced = ["session.json", "events.csv", "checkpoint.json"];
+    for name in names(&whole.at(&folder)).iter().filter(|n| !replaced.contains(&n.as_str())) {
+        let read = |desk: &Desk| fs::read(desk.at(&folder).join(name)).unwrap();
+        assert!(read(&whole) == read(&cut), "{task}: {name} differs after a resume");
+    }
+}
+
+#[test]
+fn a_swing_up_that_runs_on_goes_on_after_a_kill() {
+    goes_on_like_unbroken(
+        "swing-up",
+        "--operator simulated:average --set session.main_duration_s=900",
+    );
+}
+
+#[test]
+fn a_threshold_found_in_practice_survives_a_kill() {
+    goes_on_like_unbroken(
+        "speed-up",
+        "--operator simulated:average --set session.main_duration_s=1200 \
+         --set rules.threshold_of_own=0.8 --set sharing.freeze=share_and_learner",
+    );
+}
+
+#[test]
+fn shares_that_move_each_episode_survive_a_kill() {
+    goes_on_like_unbroken("mountain-car", "--operator simulated:naive --rollouts 250");
 }
 
 #[test]

@@ -158,7 +158,8 @@ impl<W: Witness> Cycle<W> {
         let sharing = Sharing::new(&rules.sharing, rules.mode, crew.task.regions());
         let mind = Mind { learner, sharing, learned: 0, refused: 0, tenths: 0 };
         let moment = from.as_ref().map(|(standing, _)| standing.moment);
-        let (stage, effects) = machine::begin(&rules.plan, moment);
+        let goes_on = from.as_ref().is_some_and(|(standing, _)| standing.state.is_some());
+        let (stage, effects) = machine::begin(&rules.plan, moment, goes_on);
         let names: Vec<&str> = crew.task.regions().iter().map(|region| region.name).collect();
         let teacher = Teacher::new(&rules.teaching, rules.tick, &names);
         let mut cycle = Self {

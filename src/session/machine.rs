@@ -121,9 +121,14 @@ pub enum Effect {
 }
 
 /// The stage and effects that a session begins with, at `from` or at the plan's beginning.
+/// `goes_on` says that the rollout of `from` went on from the one before: where nobody is
+/// there to get ready, it does so again, without a countdown.
 #[must_use]
-pub fn begin(plan: &Plan, from: Option<Moment>) -> (Stage, Vec<Effect>) {
+pub fn begin(plan: &Plan, from: Option<Moment>, goes_on: bool) -> (Stage, Vec<Effect>) {
     match from.or_else(|| plan.phases.first().map(|p| Moment::start_of(p.phase))) {
+        Some(moment) if goes_on && !plan.attended => {
+            (Stage::Running(moment), vec![Effect::Prepare(moment), Effect::Release(moment)])
+        }
         // A resumed phase goes on: entering it would forget what was learned.
         Some(moment) if from.is_some() && moment.rollout > 1 => arrive(plan, moment, Vec::new()),
         Some(moment) => arrive(plan, moment, vec![Effect::Enter(moment.phase)]),

@@ -111,10 +111,30 @@ fn every_stage_in_every_phase_answers_every_event_as_the_table_says() {
     insta::assert_snapshot!("machine_table", table);
 }
 
+/// Where the plant is not returned, a rollout whose time is over goes on at once; one that
+/// failed does not, and neither does one that nobody steers.
+#[test]
+fn a_session_without_returns_goes_on_where_it_was() {
+    let mut plan = plan(true);
+    plan.returns = false;
+    let over = |phase, end| {
+        let stage = Stage::Running(at(phase, 1, 7));
+        let (next, effects) = transition(&plan, stage, Event::Tick(Some(end)));
+        (words(next), effect_words(&effects))
+    };
+    let said = |stage: &str, effects: &str| (stage.to_owned(), effects.to_owned());
+    assert_eq!(over(Phase::Main, End::Cap), said("running m2@0", "cap, go on 2"));
+    let held = said("hold 3 m2@0", "halt, failed, prepare 2");
+    assert_eq!(over(Phase::Main, End::Failed), held);
+    assert!(over(Phase::Autonomous, End::Cap).1.starts_with("halt, cap, leave autonomous"));
+    let discarded = transition(&plan, Stage::Running(at(Phase::Main, 2, 7)), Event::Discard);
+    assert_eq!(effect_words(&discarded.1), "halt, discarded, restore, prepare 2");
+}
+
 #[test]
 fn an_unattended_session_runs_through_without_a_person() {
     let plan = plan(false);
-    let (mut stage, effects) = begin(&plan, None);
+    let (mut stage, effects) = begin(&plan, None, false);
     let mut story = effect_words(&effects);
     for _ in 0..200 {
         let end = match stage {
@@ -154,7 +174,7 @@ fn a_set_duration_ends_the_phase_in_the_middle_of_a_rollout() {
     };
     let plan = Plan::new(&params, Seconds(0.02), 1, false);
     assert_eq!(plan.phases, [PhasePlan { phase: Phase::Main, rollouts: None, steps: Some(50) }]);
-    let (mut stage, _) = begin(&plan, None);
+    let (mut stage, _) = begin(&plan, None, false);
     let mut ends = Vec::new();
     for k in 1..=60 {
         let end = (k % 20 == 0).then_some(End::Failed);
@@ -173,10 +193,10 @@ fn a_set_duration_ends_the_phase_in_the_middle_of_a_rollout() {
 fn a_resumed_session_goes_on_where_it_was() {
     let unattended = plan(false);
     let from = at(Phase::Main, 2, 0);
-    let (stage, effects) = begin(&unattended, Some(from));
+    let (stage, effects) = begin(&unattended, Some(from), false);
     assert_eq!(effects, [Effect::Prepare(from)], "what was learned is kept");
     assert_eq!(stage.moment(), Some(from));
-    let (stage, _) = begin(&plan(true), Some(from));
+    let (stage, _) = begin(&plan(true), Some(from), false);
     assert_eq!(stage, Stage::Instruction(from), "a person reads first");
 }
 
@@ -201,7 +221,7 @@ proptest! {
         events in prop::collection::vec(any_event(), 0..1500),
     ) {
         let plan = plan(attended);
-        let (mut stage, mut effects) = begin(&plan, None);
+        let (mut stage, mut effects) = begin(&plan, None, false);
         let (mut prepared, mut released) = (None, None);
         let mut counted = Vec::new();
         for event in events {

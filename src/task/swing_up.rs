@@ -370,3 +370,128 @@ fn height(state: &State) -> f64 {
 fn speed(state: &State) -> f64 {
     state.get(3).copied().unwrap_or(0.0).abs()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn task() -> SwingUp {
+        SwingUp::new(&Params::default(), &cart_pole::Params::default(), Seconds(0.02))
+    }
+
+    fn at(degrees: f64, speed: f64) -> State {
+        State::new([0.0, 0.0, degrees.to_radians(), speed])
+    }
+
+    /// Table 1 on, just below and just above every border, and what the errata say where its
+    /// rows overlap. Angles just beside a border: cos does not tell equal ones apart to the
+    /// last bit.
+    #[test]
+    fn the_map_is_table_1() {
+        const EDGE: f64 = 1e-9;
+        let table = [
+            (180.0, 0.0, "down_slow"),
+            (180.0, 7.999, "down_slow"),
+            (180.0, 8.0, "down_fast"),
+            (180.0, 25.0, "down_fast"),
+            (120.0 + EDGE, 7.999, "down_slow"),
+            (120.0 + EDGE, 8.0, "down_fast"),
+            (120.0 - EDGE, 0.0, "middle_slow"),
+            (120.0 - EDGE, 2.999, "middle_slow"),
+            (120.0 - EDGE, 3.0, "middle_fast"),
+            (120.0 - EDGE, 8.0, "middle_fast"),
+            (40.0 + EDGE, 1.0, "middle_slow"),
+            (40.0 + EDGE, 3.0, "middle_fast"),
+            (40.0 - EDGE, 0.999, "middle_slow"),
+            // The rows of middle slow and top fast overlap here: the fast top wins.
+            (40.0 - EDGE, 1.0, "top_fast"),
+            (35.0, 2.0, "top_fast"),
+            (35.0, 0.5, "middle_slow"),
+            (30.0 + EDGE, 0.999, "middle_slow"),
+            (30.0 - EDGE, 0.999, "top_slow"),
+            (30.0 - EDGE, 1.0, "top_fast"),
+            (0.0, 0.0, "top_slow"),
+            (0.0, 0.999, "top_slow"),
+            (0.0, 1.0, "top_fast"),
+            (0.0, 21.0, "top_fast"),
+        ];
+        let task = task();
+        for (degrees, speed, region) in table {
+            // To either side, in either direction, and after whole turns.
+            for (turns, side) in [(0.0, 1.0), (0.0, -1.0), (2.0, 1.0), (-1.0, -1.0)] {
+                for speed in [speed, -speed] {
+                    let state = at(side * degrees + 360.0 * turns, speed);
+                    let found = task.regions()[task.region(&state)].name;
+                    // Whole turns cost the last digits of an angle beside a border.
+                    let is_beside = (degrees - degrees.round()).abs() > 0.0 && turns != 0.0;
+                    assert!(is_beside || found == region, "{degrees}° {speed}: {found}");
+                }
+            }
+        }
+    }
+
+    /// Eq. 9: success is 0 at a region's lowest height and 1 at its goal's.
+    #[test]
+    fn success_runs_from_the_lowest_height_of_a_region_to_its_goal() {
+        let task = task();
+        let ends = [
+            ("down_slow", 180.0, 160.0),
+            ("down_fast", 180.0, 160.0),
+            ("middle_slow", 120.0, 70.0),
+            ("middle_fast", 120.0, 60.0),
+            ("top_slow", 30.0, 4.0),
+            ("top_fast", 40.0, 20.0),
+        ];
+        for (region, (name, lowest, goal)) in task.regions().iter().zip(ends) {
+            assert_eq!(region.name, name);
+            let success = |degrees: f64| region.scale.success(degrees.to_radians().cos());
+            assert!(success(lowest).abs() < 1e-12 && (success(goal) - 1.0).abs() < 1e-12);
+            assert_eq!(success(goal / 2.0), 1.0, "it saturates");
+        }
+    }
+
+    #[test]
+    fn heights_time_at_the_top_and_the_longest_hold_are_counted() {
+        let task = task();
+        let mut tally = task.tally();
+        let next = at(0.0, 0.0);
+        // Two steps within the hold, one fast at 35°, three within, and hanging.
+        for degrees in [10.0, 29.0, 35.0, 5.0, 5.0, 5.0, 180.0, 180.0] {
+            let speed = if degrees == 35.0 { 2.0 } else { 0.0 };
+            tally.step(&at(degrees, speed), &next);
+        }
+        let tallied = tally.tallied();
+        let cos = |degrees: f64| degrees.to_radians().cos();
+        let sum = cos(10.0) + cos(29.0) + cos(35.0) + 3.0 * cos(5.0) - 2.0;
+        assert!((tallied[0] - sum / 8.0).abs() < 1e-12);
+        assert!((tallied[1] - 6.0 / 8.0).abs() < 1e-12);
+        assert!((tallied[2] - 0.06).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_person_starts_at_rest_and_a_test_with_a_push_to_either_side() {
+        use crate::random::{Place, Purpose, stream};
+        let task = task();
+        let mut chance = stream(1, Purpose::Starts, Place::default());
+        let taught = task.random_start(Occasion::Taught, &mut chance);
+        assert_eq!((taught[2], taught[3]), (std::f64::consts::PI, 0.0));
+        let pushes = [0, 1, 2].map(|k| task.grid_start(k, 3)[3].to_degrees());
+        assert!((pushes[0] - 30.0).abs() < 1e-12 && pushes[1] == -pushes[0]);
+        assert_eq!(pushes[2], pushes[0]);
+        assert_eq!(task.end(&taught, 999, Occasion::Taught), None);
+        assert_eq!(task.end(&taught, 1000, Occasion::Taught), Some(End::Cap));
+        assert_eq!(task.end(&taught, 1000, Occasion::Tested), None);
+        assert_eq!(task.end(&taught, 1500, Occasion::Tested), Some(End::Cap));
+        assert_eq!(task.end(&at(f64::NAN, 0.0), 1, Occasion::Tested), Some(End::Failed));
+    }
+
+    /// Pumping lowers the cost from hanging on; standing upright has none.
+    #[test]
+    fn the_cost_is_the_missing_energy_and_at_the_top_the_distance() {
+        let task = task();
+        assert!((task.cost(&at(180.0, 0.0)) - 2.0).abs() < 1e-12);
+        assert!(task.cost(&at(180.0, 5.0)) < task.cost(&at(180.0, 2.0)));
+        assert!(task.cost(&at(0.0, 0.0)) < 1e-12);
+        assert!(task.cost(&at(10.0, 0.0)) < task.cost(&at(20.0, 0.0)));
+    }
+}
