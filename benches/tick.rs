@@ -14,12 +14,13 @@ use coadapt::control::scribe::{Origin, Scribe};
 use coadapt::control::snapshot::{Watcher, channel};
 use coadapt::control::witness::{Nobody, Witness};
 use coadapt::learner::{Learner, Model, Params};
-use coadapt::operator::simulated::{Kind, Simulated, Skill};
+use coadapt::operator::simulated::cart_pole::Balancer;
+use coadapt::operator::simulated::{self, Kind, Skill};
 use coadapt::plant::cart_pole;
 use coadapt::profile::{Document, Profile};
 use coadapt::random::{Place, Purpose, stream};
 use coadapt::record::sidecar::Host;
-use coadapt::record::{Folder, Manner, Recorder, Sidecar, Status, VERSION};
+use coadapt::record::{Columns, Folder, Manner, Recorder, Sidecar, Status, VERSION};
 use coadapt::session::machine::Stage;
 use coadapt::session::plan::Plan;
 use coadapt::session::{Moment, Phase, Trial};
@@ -102,7 +103,8 @@ fn scribe(profile: &Profile, logs: &Path) -> Scribe {
     let created = Folder::create(logs, &sidecar.subject, None, "balance", "simultaneous")
         .expect("a place to record");
     let columns = profile.experiment.columns();
-    let recorder = Recorder::start(created.folder, columns, Manner::Live, &sidecar)
+    let both = Columns { state: columns, tally: &[] };
+    let recorder = Recorder::start(created.folder, &both, Manner::Live, &sidecar)
         .expect("the recorder starts");
     let origin = Origin {
         task: sidecar.task,
@@ -127,8 +129,9 @@ impl<W: Witness> Bench<W> {
     fn new(profile: &Profile, learner: &Model, witness: W) -> Self {
         let tick = profile.tick();
         let plant = cart_pole::Params::default();
-        let params = &profile.operator.simulated;
-        let operator = Simulated::new(params, Skill::Expert, Kind::default(), SEED, tick, &plant);
+        let params = simulated::cart_pole::Params::default();
+        let kind = Kind::default();
+        let operator = Balancer::new(&params, Skill::Expert, kind, SEED, tick, &plant);
         let (publisher, watcher) = channel(Stage::Instruction(Moment::start_of(Phase::Main)));
         let rules = Rules {
             plan: plan(profile),

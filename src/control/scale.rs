@@ -19,7 +19,9 @@ pub fn regions(task: &dyn Task, earlier: &[EpisodeRow]) -> (Vec<Region>, Option<
     let mean = total / steps;
     match task.own_scale(mean).filter(|_| steps > 0.0) {
         Some(scale) => {
-            regions.iter_mut().for_each(|region| region.scale = scale);
+            for region in &mut regions {
+                region.scale = scale;
+            }
             (regions, Some(mean))
         }
         None => (regions, None),

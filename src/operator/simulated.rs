@@ -19,7 +19,6 @@ pub mod swing_up;
 use std::fmt;
 use std::str::FromStr;
 
-pub use cart_pole::{Balancer as Simulated, Params};
 pub use growth::{BySkill, Growth, NaiveAverageExpert};
 
 /// How well an operator steers.

@@ -1,5 +1,6 @@
 //! `coadapt evaluate`: policies alone over many starts, beside nobody on the same ones.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -217,10 +218,11 @@ impl Alone {
         let decimals = yardstick.decimals;
         let mut words = self.measures.sentence();
         if let Some(median) = self.median {
-            words += &format!("; median {median:.decimals$}");
+            // Writing to a text cannot fail.
+            let _ = write!(words, "; median {median:.decimals$}");
         }
         if let Some((low, high)) = self.interval95 {
-            words += &format!(", 95 % of the mean {low:.decimals$} to {high:.decimals$}");
+            let _ = write!(words, ", 95 % of the mean {low:.decimals$} to {high:.decimals$}");
         }
         words
     }

@@ -145,7 +145,7 @@ impl Task for SpeedUp {
     /// With a push and from rest in turn, each to one side and the other in turn: many
     /// policies never start from rest.
     fn grid_start(&self, index: u32, _count: u32) -> State {
-        let side = if index / 2 % 2 == 0 { 1.0 } else { -1.0 };
+        let side = if (index / 2).is_multiple_of(2) { 1.0 } else { -1.0 };
         if index.is_multiple_of(2) {
             Self::level(0.0, side * self.rules.test_push_m_s)
         } else {
@@ -175,7 +175,7 @@ impl Task for SpeedUp {
             Occasion::Taught => self.rollout_steps,
             Occasion::Tested => self.test_steps,
         };
-        if !state.is_finite() { Some(End::Failed) } else { (steps >= all).then_some(End::Cap) }
+        if state.is_finite() { (steps >= all).then_some(End::Cap) } else { Some(End::Failed) }
     }
 
     fn regions(&self) -> &[Region] {

@@ -296,7 +296,7 @@ impl Task for SwingUp {
             Occasion::Taught => self.rollout_steps,
             Occasion::Tested => self.test_steps,
         };
-        if !state.is_finite() { Some(End::Failed) } else { (steps >= all).then_some(End::Cap) }
+        if state.is_finite() { (steps >= all).then_some(End::Cap) } else { Some(End::Failed) }
     }
 
     fn regions(&self) -> &[Region] {
