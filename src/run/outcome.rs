@@ -62,7 +62,7 @@ impl Results {
     #[must_use]
     pub fn title(&self) -> String {
         let Self { task, mode, learner, preset, subject, trial, .. } = self;
-        format!("{task} · {mode} · {learner} · {preset}   {subject} trial {trial:03}")
+        format!("{task} · {mode} · {learner} · {preset}   {subject} {trial:03}")
     }
 
     /// Whether this was a session of `task`.

@@ -45,7 +45,7 @@ fn swing_up(pen: &mut Pen<'_>, view: &View<'_>) {
     let turn = std::f64::consts::TAU;
     let angle = (theta - turn * (theta / turn).round()).to_degrees();
     left(pen, 2, "angle", &format!("{}°", signed(angle, 6, 0)), Role::Text);
-    right(pen, 2, "speed", &format!("{} /s", signed(state(view, 3), 5, 1)));
+    right(pen, 2, "ω", &format!("{} rad/s", signed(state(view, 3), 5, 1)));
 }
 
 /// The ball's speed now and on average in this rollout, and how often it ran over a limit.
