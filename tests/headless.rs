@@ -461,6 +461,77 @@ fn evaluate_repeats_the_autonomous_phase_and_takes_other_starts() {
     assert!(start(0) != start(1) && start(0).abs() < 0.0873);
 }
 
+/// HOUSE's keys of every task, the tables' columns, and that rollouts can replace a duration.
+#[test]
+fn every_task_reports_its_own_measures() {
+    for (task, each, main) in [
+        ("swing-up", &["mean_height", "top_share", "longest_hold_s"][..], "regions"),
+        ("speed-up", &["mean_speed", "end_hits"], "tau_steps"),
+        ("mountain-car", &["mean_steps", "mean_reward", "solved"], "tau_episodes"),
+    ] {
+        let desk = Desk::new();
+        let json: Value = serde_json::from_str(&desk.succeed(&format!(
+            "run {task} --headless --operator simulated:average --seed 1 --json --rollouts 3 \
+             --set session.introduction_rollouts=1 --set session.introduction_duration_s=None \
+             --set session.autonomous_rollouts=2"
+        )))
+        .unwrap();
+        assert_eq!(json["task"], task);
+        for phase in ["introduction", "main", "autonomous", "zero_control"] {
+            for key in each {
+                let value = &json["phases"][phase][*key];
+                assert!(value.is_number(), "{task} {phase} {key}: {value}");
+            }
+        }
+        assert_eq!(json["phases"]["main"]["episodes"], 3);
+        assert!(!json["phases"]["main"][main].is_null(), "{task}: {main}");
+        if task == "swing-up" {
+            let regions = json["phases"]["main"]["regions"].as_array().unwrap();
+            let names: Vec<&str> = regions.iter().map(|r| r["name"].as_str().unwrap()).collect();
+            let expected =
+                ["down_slow", "down_fast", "middle_slow", "middle_fast", "top_slow", "top_fast"];
+            assert_eq!(names, expected);
+            assert!(regions.iter().all(|r| r["share"].is_number() && r["success"].is_number()));
+        }
+        let folder = desk.at(&format!("logs/anon/001-{task}-simultaneous"));
+        let header = |file: &str| -> String {
+            fs::read_to_string(folder.join(file)).unwrap().lines().next().unwrap().to_owned()
+        };
+        let own = match task {
+            "swing-up" => ",mean_height,top_share,longest_hold_s",
+            "speed-up" => ",mean_speed,end_hits",
+            _ => "",
+        };
+        assert!(header("episodes.csv").ends_with(&format!("receptive_fields{own}")), "{task}");
+        assert!(header("evaluation.csv").ends_with(&format!("mean_reward{own}")), "{task}");
+        let steps = header("steps.csv");
+        let state = if task == "mountain-car" { ",t,x,v,u_human" } else { ",t,x,x_dot,theta" };
+        assert!(steps.contains(state), "{steps}");
+    }
+}
+
+/// A rollout of a session that runs on begins where the one before ended.
+#[test]
+fn a_swing_up_runs_on_without_a_return() {
+    let desk = Desk::new();
+    desk.succeed(
+        "run swing-up --headless --operator simulated:average --seed 2 --rollouts 3 \
+         --phases main --set rules.rollout_s=2.0",
+    );
+    let steps = rows(&desk.at("logs/anon/001-swing-up-simultaneous/steps.csv"));
+    let state = |row: &Row| ["x", "x_dot", "theta", "theta_dot"].map(|c| row.word(c).to_owned());
+    let of = |episode: &str| -> Vec<&Row> {
+        steps.iter().filter(|row| row.word("episode") == episode).collect()
+    };
+    for (before, after) in [("1", "2"), ("2", "3")] {
+        let (before, after) = (of(before), of(after));
+        assert_eq!(before.len(), 101, "a hundred steps and the ending state");
+        assert_eq!(state(before[100]), state(after[0]));
+        assert_eq!(after[0].word("t"), "0.0");
+        assert_ne!(state(after[0]), state(of("1")[0]), "it moves");
+    }
+}
+
 #[test]
 fn simulate_prints_the_plants_own_steps() {
     let desk = Desk::new();

@@ -428,10 +428,12 @@ fn assigned_modes_are_balanced_over_subjects_who_keep_theirs() {
     taught("a", Mode::Sequential, true);
     taught("a", Mode::Simultaneous, false);
     taught("b", Mode::Sequential, false);
-    let modes = assignment::modes_so_far(logs.path(), "balance");
+    let modes = assignment::modes_so_far(logs.path(), "balance", "balance");
     assert_eq!(modes, [Mode::Sequential, Mode::Sequential]);
     assert_eq!(assignment::assign(&modes, &mut chance()), Mode::Simultaneous);
-    assert_eq!(assignment::modes_so_far(logs.path(), "swing-up"), []);
-    let mode_of = |s: &str| assignment::mode_of(logs.path(), &s.parse().unwrap(), "balance");
+    assert_eq!(assignment::modes_so_far(logs.path(), "swing-up", "balance"), []);
+    assert_eq!(assignment::modes_so_far(logs.path(), "balance", "modern"), [], "never pooled");
+    let mode_of =
+        |s: &str| assignment::mode_of(logs.path(), &s.parse().unwrap(), "balance", "balance");
     assert_eq!((mode_of("a"), mode_of("b"), mode_of("c")), (Some(Mode::Sequential), None, None));
 }

@@ -12,21 +12,23 @@ use super::sidecar::{Sidecar, read_sidecar};
 use crate::session::{Phase, Subject};
 use crate::sharing::Mode;
 
-/// The modes in which subjects were taught `task` in the sessions in `logs`: one for each
-/// subject, that of the earliest session with a main phase.
+/// The modes in which subjects were taught `task` with `preset` in the sessions in `logs`:
+/// one for each subject, that of the earliest session with a main phase. Presets are
+/// different experiments.
 #[must_use]
-pub fn modes_so_far(logs: &Path, task: &str) -> Vec<Mode> {
+pub fn modes_so_far(logs: &Path, task: &str, preset: &str) -> Vec<Mode> {
     let mut modes = BTreeMap::new();
-    for session in taught(logs, task) {
+    for session in taught(logs, task, preset) {
         modes.entry(session.subject.as_str().to_owned()).or_insert(session.mode);
     }
     modes.into_values().collect()
 }
 
-/// The mode that `subject` was assigned for `task` before. A subject keeps its mode.
+/// The mode that `subject` was assigned for `task` with `preset` before. A subject keeps its
+/// mode.
 #[must_use]
-pub fn mode_of(logs: &Path, subject: &Subject, task: &str) -> Option<Mode> {
-    taught(logs, task)
+pub fn mode_of(logs: &Path, subject: &Subject, task: &str, preset: &str) -> Option<Mode> {
+    taught(logs, task, preset)
         .find(|session| session.assigned && session.subject == *subject)
         .map(|session| session.mode)
 }
@@ -45,10 +47,12 @@ pub fn assign(modes: &[Mode], chance: &mut ChaCha8Rng) -> Mode {
     }
 }
 
-/// The sessions of `task` with a main phase, each subject's in the order of trials.
-fn taught(logs: &Path, task: &str) -> impl Iterator<Item = Sidecar> {
+/// The sessions of `task` and `preset` with a main phase, each subject's in the order of
+/// trials.
+fn taught(logs: &Path, task: &str, preset: &str) -> impl Iterator<Item = Sidecar> {
     let sessions = folder::sessions(logs).into_iter();
-    sessions
-        .filter_map(|path| read_sidecar(&path.join(SESSION)).ok())
-        .filter(move |session| session.task == task && session.planned.contains(&Phase::Main))
+    sessions.filter_map(|path| read_sidecar(&path.join(SESSION)).ok()).filter(move |session| {
+        (session.task.as_str(), session.preset.as_str()) == (task, preset)
+            && session.planned.contains(&Phase::Main)
+    })
 }

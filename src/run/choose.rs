@@ -61,17 +61,19 @@ pub(super) fn order_policy(
     Ok(Some(policy))
 }
 
-/// The subject's latest final policy for the task.
+/// The subject's latest final policy for the task, taught with the same preset.
 fn last_policy(order: &Order, profile: &Profile) -> Result<PathBuf, RunError> {
     let kept = folder::trials(&order.logs, &order.subject).map_err(|e| usage(&e))?;
-    let task = profile.experiment.name();
+    let (task, preset) = (profile.experiment.name(), &profile.preset);
+    let fits = |policy: record::Policy<Model>| policy.task == task && policy.preset == *preset;
     kept.iter()
         .rev()
         .map(|kept| kept.path.join(policy::file_name(None)))
-        .find(|path| record::read_policy::<Model>(path).is_ok_and(|policy| policy.task == task))
+        .find(|path| record::read_policy::<Model>(path).is_ok_and(fits))
         .ok_or_else(|| {
             RunError::Usage(format!(
-                "--policy last: subject {} has no policy for {task} in {}; give its file",
+                "--policy last: subject {} has no policy for {task}, preset {preset}, in {}; give \
+                 its file",
                 order.subject,
                 order.logs.display()
             ))
@@ -94,9 +96,9 @@ pub(super) fn cut_off_notice(order: &Order, profile: &Profile) -> Option<String>
 
 /// The mode that the subject had, or the one that fewer subjects have.
 pub(super) fn assigned_mode(order: &Order, profile: &Profile, seed: u64) -> Mode {
-    let task = profile.experiment.name();
-    assignment::mode_of(&order.logs, &order.subject, task).unwrap_or_else(|| {
-        let so_far = assignment::modes_so_far(&order.logs, task);
+    let (task, preset) = (profile.experiment.name(), profile.preset.as_str());
+    assignment::mode_of(&order.logs, &order.subject, task, preset).unwrap_or_else(|| {
+        let so_far = assignment::modes_so_far(&order.logs, task, preset);
         let mut chance = stream(seed, Purpose::Assignment, Place::default());
         assignment::assign(&so_far, &mut chance)
     })
