@@ -214,7 +214,10 @@ impl Sharing {
         here.window.push(measure);
         let success = here.window.success();
         let gate_opened = here.weight.step(success, &self.dynamics);
-        let froze = here.window.is_full() && here.weight.freeze(&self.dynamics);
+        // Who only watches is handed nothing.
+        let froze = self.mode == Mode::Simultaneous
+            && here.window.is_full()
+            && here.weight.freeze(&self.dynamics);
         Observed { success, gate_opened, froze }
     }
 
@@ -359,7 +362,7 @@ mod tests {
         };
         let mut s = Sharing::new(&params, Mode::Sequential, &WHOLE);
         for _ in 0..100 {
-            s.observe(0, 1.0);
+            assert!(!s.observe(0, 1.0).froze);
         }
         assert!(!s.is_frozen(0) && !s.is_learner_frozen(0));
     }

@@ -73,6 +73,14 @@ fn the_plain_profiles_are_their_tasks_defaults() {
 }
 
 #[test]
+fn scales_are_asked_for_by_the_inputs_names() {
+    let mut document = Document::find("speed-up", &nowhere()).unwrap();
+    document.set("rules.use_theta_dot", "true");
+    let message = message(&document);
+    assert!(message.contains("a list of 4, for x, x_dot, theta, theta_dot"), "{message}");
+}
+
+#[test]
 fn an_unknown_region_of_teaching_is_refused_with_the_regions() {
     let text = "(task: \"swing-up\", teaching: (delay_regions: [\"top\"]))";
     let message = message(&Document::from_text("x.ron", text));

@@ -53,6 +53,34 @@ fn enter_plays_at_once_and_q_leaves() {
 }
 
 #[test]
+fn every_task_is_played_on_a_terminal() {
+    for (task, seen) in [("swing-up", "DOWN SLOW"), ("speed-up", "beam"), ("mountain-car", "place")]
+    {
+        let line = format!("run {task} --seed 1 --phases main --set session.hold_s=0.1");
+        let mut terminal = Seat::default().open(&line);
+        terminal.shows("Enter   begin");
+        terminal.keys("\r");
+        terminal.goes();
+        terminal.shows(seen);
+        let folder = format!("logs/anon/001-{task}-simultaneous");
+        let pushed = |push: f64| terminal.pushes(&folder).iter().any(|u| *u == push);
+        terminal.keys("\x1b[C");
+        let push = if task == "mountain-car" {
+            1.0
+        } else if task == "speed-up" {
+            3.0
+        } else {
+            5.0
+        };
+        terminal.shows_that("a push to the right", |_| pushed(push));
+        end(&terminal);
+        assert_eq!(terminal.code(), 0, "{task}");
+        terminal.is_given_back();
+        assert_eq!(terminal.session(&folder)["status"], "aborted");
+    }
+}
+
+#[test]
 fn arrow_keys_push_for_a_while_where_releases_are_not_reported() {
     let mut terminal = live(Answers::Plainly);
     for _ in 0..25 {

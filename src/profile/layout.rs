@@ -109,6 +109,14 @@ macro_rules! sections {
                 c.range("tick_ms", self.tick_ms, 1.0..=1000.0);
                 self.experiment.check(c);
                 let task = self.experiment.task(self.tick());
+                let features = task.feature_names();
+                let (given, wanted) = (self.learner.norm_in.len(), features.len());
+                c.demand(
+                    given == wanted,
+                    "learner.norm_in",
+                    format_args!("a list of {given}"),
+                    &format!("a list of {wanted}, for {}", features.join(", ")),
+                );
                 let regions: Vec<&str> = task.regions().iter().map(|r| r.name).collect();
                 for name in &self.teaching.delay_regions {
                     c.demand(

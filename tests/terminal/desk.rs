@@ -282,9 +282,11 @@ impl Terminal {
     pub fn pushes(&self, folder: &str) -> Vec<f64> {
         let text = fs::read_to_string(self.at(folder).join("steps.csv")).unwrap_or_default();
         let whole = &text[..text.rfind('\n').map_or(0, |end| end + 1)];
-        let rows = whole.lines().skip(1).map(|row| row.split(',').collect::<Vec<_>>());
-        rows.inspect(|row| assert_eq!(row.len(), 17, "{row:?}"))
-            .filter_map(|row| row[8].parse().ok())
+        let mut rows = whole.lines().map(|row| row.split(',').collect::<Vec<_>>());
+        let Some(header) = rows.next() else { return Vec::new() };
+        let human = header.iter().position(|name| *name == "u_human").unwrap();
+        rows.inspect(|row| assert_eq!(row.len(), header.len(), "{row:?}"))
+            .filter_map(|row| row[human].parse().ok())
             .collect()
     }
 }
