@@ -63,7 +63,7 @@ fn every_task_is_played_on_a_terminal() {
         terminal.goes();
         terminal.shows(seen);
         let folder = format!("logs/anon/001-{task}-simultaneous");
-        let pushed = |push: f64| terminal.pushes(&folder).iter().any(|u| *u == push);
+        let pushed = |push: f64| terminal.pushes(&folder).contains(&push);
         terminal.keys("\x1b[C");
         let push = if task == "mountain-car" {
             1.0
