@@ -132,7 +132,7 @@ pub const BINDINGS: &[Binding] = {
         bind(Briefing, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
         bind(Briefing, &[Char('q')], "q", "end", "end the session (asks once)", A::Quit),
         //
-        elsewhere(Live, "← →", "push", "push the cart while held; also h l and a d"),
+        elsewhere(Live, "← →", "push", "steer while held; also h l and a d"),
         bind(Live, &[Char(' ')], "space", "stop", "emergency stop, until Enter", A::Stop),
         bind(Live, &[Enter], "Enter", "", "go on after a stop or a pause", A::Begin),
         bind(Live, &[Char('P'), Esc], "P", "pause", "pause, or go on; also Esc", A::Pause),

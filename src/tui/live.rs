@@ -56,6 +56,8 @@ pub struct Info {
     pub gate_is_timer: bool,
     /// Whether shares move once an episode.
     pub by_episode: bool,
+    /// The steps after which a rollout is given up; `None` where that is not what is counted.
+    pub cap_steps: Option<u32>,
     /// The largest action.
     pub action_limit: f64,
     /// The action's unit, one or two characters.

@@ -277,6 +277,7 @@ mod tests {
                 names: &regions::NAMES,
                 shares: (a > 0.0).then_some(&strange[..]),
                 successes: (b > 0.0).then_some(&strange[..]),
+                frozen: (b > 0.0).then_some(&[true, false, true][..]),
                 current,
                 theta: state[2],
                 theta_dot: state[3],

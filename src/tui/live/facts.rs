@@ -67,18 +67,21 @@ fn speed_up(pen: &mut Pen<'_>, view: &View<'_>) {
     }
 }
 
-/// The step, the best rollout so far, and the latest ones.
+/// The step of how many, the best rollout so far, the latest ones, and how many of them
+/// reached the flag.
 fn mountain_car(pen: &mut Pen<'_>, view: &View<'_>) {
     let step = view.panel.stage.moment().map_or(0, |moment| moment.step);
     let steps = measured(view);
-    let reached = rollouts_of(&view.history.rollouts, view.phase())
+    let reached: Vec<f64> = rollouts_of(&view.history.rollouts, view.phase())
         .filter(|row| row.end == End::Goal)
-        .map(|row| f64::from(row.steps));
-    let best = reached.fold(f64::NAN, f64::min);
-    left(pen, 0, "step", &count(step.into(), 5), Role::Strong);
-    right(pen, 0, "best", &format!("{} steps", fixed(best, 3, 0)));
+        .map(|row| f64::from(row.steps))
+        .collect();
+    let best = reached.iter().copied().fold(f64::NAN, f64::min);
+    let of = view.info.cap_steps.map_or_else(String::new, |cap| format!("/{cap}"));
+    left(pen, 0, "step", &format!("{}{of}", count(step.into(), 3)), Role::Strong);
+    right(pen, 0, "best", &fixed(best, 5, 0));
     last_ten(pen, &steps, 1.0, 0);
-    left(pen, 2, "place", &signed(state(view, 0), 6, 3), Role::Text);
+    left(pen, 2, "flags", &format!("{}/{}", reached.len(), steps.len()), Role::Text);
     right(pen, 2, "speed", &signed(state(view, 1), 6, 3));
 }
 

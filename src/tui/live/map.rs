@@ -31,6 +31,7 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
         names: &regions::NAMES,
         shares: is_shown.then_some(&shares[..]),
         successes: (is_shown && phase == Phase::Main).then_some(&view.panel.successes[..]),
+        frozen: (is_shown && phase == Phase::Main).then_some(&view.panel.frozen[..]),
         current: view.scene.region,
         theta: at(2),
         theta_dot: at(3),

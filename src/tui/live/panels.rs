@@ -108,12 +108,14 @@ fn gate(view: &View<'_>, is_wide: bool) -> (String, Role) {
         return (format!("gate {gate} %: not yet"), Role::Dim);
     };
     let tau = fixed(opened.tau, 0, 0);
+    let at = opened.step;
     let words = match (is_wide, view.info.by_episode) {
-        (true, true) => "gate opened at episode",
-        (true, false) => "gate opened at step",
-        (false, _) => "open",
+        (true, true) => format!("open at episode {at}, τ {tau} episodes"),
+        (true, false) => format!("gate opened at step {at}, τ {tau}"),
+        (false, true) => format!("open ep {at}, τ {tau}"),
+        (false, false) => format!("open {at}, τ {tau}"),
     };
-    (format!("{words} {}, τ {tau}", opened.step), Role::Robot)
+    (words, Role::Robot)
 }
 
 /// Three bars around zero: what you want, what the robot wants, what the motor gets.

@@ -66,6 +66,8 @@ pub struct Map<'a> {
     pub shares: Option<&'a [f64]>,
     /// The success of each; `None` where there is none or it is not to be seen.
     pub successes: Option<&'a [f64]>,
+    /// Whether each is handed over for good; `None` where it is not to be seen.
+    pub frozen: Option<&'a [bool]>,
     /// The region of the state.
     pub current: usize,
     /// The pole's angle from upright, rad.
@@ -83,10 +85,18 @@ impl Map<'_> {
         self.shares.and_then(|shares| shares.get(region)).copied()
     }
 
+    /// Whether the share of `region` no longer moves.
+    fn is_frozen(&self, region: usize) -> bool {
+        self.frozen.and_then(|frozen| frozen.get(region)).copied().unwrap_or(false)
+    }
+
     fn success(&self, region: usize) -> Option<f64> {
         self.successes.and_then(|successes| successes.get(region)).copied()
     }
 }
+
+/// The word for a region that is handed over: its share moves no more.
+const FROZEN: &str = "fixed";
 
 /// The smallest map, in cells.
 pub const LEAST: (u16, u16) = (19, 8);
@@ -218,7 +228,8 @@ fn cell(pen: &mut Pen<'_>, seen: &Map<'_>, grid: Grid, region: usize) {
     let word = name.split(' ').next().unwrap_or_default();
     let word = if is_here { word.to_uppercase() } else { word.to_owned() };
     let role = if is_here { Role::Strong } else { Role::Text };
-    let words = [word, share.map_or_else(String::new, yours)];
+    let fixed = if seen.is_frozen(region) { FROZEN } else { "" };
+    let words = [word, share.map_or_else(String::new, yours), fixed.to_owned()];
     if grid.down == 1 {
         // One row: the share says more than a name that the eye finds by place.
         let number = share.map(percent);
@@ -226,7 +237,8 @@ fn cell(pen: &mut Pen<'_>, seen: &Map<'_>, grid: Grid, region: usize) {
         return;
     }
     let first = (grid.down - 2) / 2;
-    for (word, row) in words.iter().zip(first..) {
+    // What does not fit is what comes last.
+    for (word, row) in words.iter().zip(first..grid.down) {
         if !word.is_empty() {
             let width = usize::from(grid.words());
             part.text(0, row, &format!("{:<width$}", cut(word, 7)), role);
@@ -342,6 +354,12 @@ impl Bars {
         }
         if let (Some(at), Some(success)) = (self.success, seen.success(region)) {
             bar(pen, at, success, ("■", Role::Go), ("·", Role::Dim), role);
+            // Success moves nothing any more: a word in place of its bar.
+            if seen.is_frozen(region) {
+                let room = at.1.saturating_sub(at.0 + Self::NUMBER);
+                pen.repeat(at.0, 0, " ", room, Role::Text);
+                pen.text(at.0, 0, &cut(FROZEN, room.into()), Role::Robot);
+            }
         }
     }
 }
@@ -398,6 +416,7 @@ mod tests {
             names: &NAMES,
             shares: Some(&[0.03, 0.05, 0.22, 0.48, 0.74, 1.0]),
             successes: Some(&[0.97, 0.95, 0.74, 0.5, 0.3, 0.1]),
+            frozen: None,
             current,
             theta,
             theta_dot,
@@ -418,6 +437,11 @@ mod tests {
 
     #[test]
     fn what_is_hidden_is_not_shown() {
+        let frozen = Some(&[true; 6][..]);
+        let told = picture((48, 30), Glyphs::Braille, |pen| {
+            draw(pen, &Map { frozen, ..seen(4, 0.1, 0.2) });
+        });
+        assert!(told.matches(FROZEN).count() == 12, "{told}");
         let hidden = Map { shares: None, successes: None, ..seen(4, 0.1, 0.2) };
         let drawn = picture((48, 30), Glyphs::Braille, |pen| draw(pen, &hidden));
         assert!(!drawn.contains('%') && !drawn.contains('▒') && drawn.contains("TOP SLOW"));
