@@ -171,7 +171,7 @@ fn draw_page(pen: &mut Pen<'_>, info: &Info, page: usize) {
             write(&mut pen.part(0, chart, width, height - chart), &lines);
         }
         1 => {
-            let lines = regions(info);
+            let lines = regions(info, width.saturating_sub(2));
             let chart = height.saturating_sub(u16::try_from(lines.len()).unwrap_or(0));
             charts::sharing(&mut pen.part(0, 0, width, chart), info);
             write(&mut pen.part(0, chart, width, height - chart), &lines);
@@ -206,8 +206,8 @@ fn statistics(info: &Info, phases: &[Phase]) -> Vec<String> {
     phases.iter().filter_map(line).collect()
 }
 
-/// How main ended in each region, slow beside fast.
-fn regions(info: &Info) -> Vec<String> {
+/// How main ended in each region, slow beside fast where `width` has room for both.
+fn regions(info: &Info, width: u16) -> Vec<String> {
     let one = |region: &RegionEnd| {
         format!(
             "{:<12}share {} % success {} %",
@@ -216,11 +216,13 @@ fn regions(info: &Info) -> Vec<String> {
             fixed(100.0 * region.success, 3, 0)
         )
     };
-    info.regions
-        .chunks(2)
-        .rev()
-        .map(|pair| pair.iter().map(one).collect::<Vec<_>>().join("   "))
-        .collect()
+    let pairs = info.regions.chunks(2).rev().map(|pair| pair.iter().map(one).collect::<Vec<_>>());
+    let beside: Vec<String> = pairs.clone().map(|pair| pair.join("   ")).collect();
+    if beside.iter().all(|line| columns(line) <= width) {
+        beside
+    } else {
+        pairs.flatten().collect()
+    }
 }
 
 fn write(pen: &mut Pen<'_>, lines: &[String]) {

@@ -29,6 +29,9 @@ impl Scale {
 
 type Points = Vec<(f64, f64)>;
 
+/// A chart narrower than this has another one beside it.
+const ROOMY: u16 = 45;
+
 /// One set of points: its name, how it is drawn, its colour.
 struct Curve {
     name: &'static str,
@@ -201,7 +204,8 @@ fn chart(pen: &mut Pen<'_>, curves: &[Curve], x: &Scale, y: &Scale) {
         .render(area, part.buffer());
 }
 
-/// What the chart shows, and what its marks mean; returns the rows that took.
+/// What the chart shows, and what its marks mean; returns the rows that took. Narrow charts
+/// stand beside each other: they take two rows each, so that their axes are level.
 fn legend(pen: &mut Pen<'_>, curves: &[Curve], title: &str) -> u16 {
     let entries: Vec<_> = curves
         .iter()
@@ -210,7 +214,7 @@ fn legend(pen: &mut Pen<'_>, curves: &[Curve], title: &str) -> u16 {
         .collect();
     let taken: u16 = entries.iter().map(|(entry, _)| columns(entry) + 2).sum();
     let after_title = pen.text(1, 0, title, Role::Text) + 2;
-    let same_row = after_title + taken <= pen.width();
+    let same_row = pen.width() >= ROOMY && after_title + taken <= pen.width();
     let (mut x, y) = if same_row { (pen.width().saturating_sub(taken), 0) } else { (1, 1) };
     for (entry, role) in entries {
         x = pen.text(x, y, &entry, role) + 2;

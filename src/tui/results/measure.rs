@@ -31,9 +31,11 @@ pub(super) fn title(yardstick: &Yardstick) -> String {
     titled(yardstick.name, yardstick.unit)
 }
 
-/// The title for what nobody but the robot did, such as "alone, s".
+/// The title for what nobody but the robot did, such as "alone, s", short enough for half a
+/// column.
 pub(super) fn title_alone(yardstick: &Yardstick) -> String {
-    if yardstick.unit.is_empty() { title(yardstick) } else { titled("alone", yardstick.unit) }
+    let name = if yardstick.unit.is_empty() { yardstick.word } else { "alone" };
+    titled(name, yardstick.unit)
 }
 
 /// Decimals on axes: numbers there are rounder than those in words.
@@ -81,7 +83,8 @@ mod tests {
     fn titles_name_the_unit() {
         assert_eq!(title(&yardstick("balance")), "balance time, s");
         assert_eq!(title_alone(&yardstick("balance")), "alone, s");
-        assert_eq!(title_alone(&yardstick("swing-up")), "mean height");
+        assert_eq!(title_alone(&yardstick("swing-up")), "height");
+        assert_eq!(title_alone(&yardstick("mountain-car")), "steps");
         assert_eq!(Start::RELEASE.title(), "release, °");
     }
 }
