@@ -359,6 +359,17 @@ fn a_phase_ends_after_rollouts_or_after_a_time() {
 }
 
 #[test]
+fn a_time_can_be_typed_over_a_count() {
+    let mut desk = Desk::nowhere();
+    desk.go(Field::Introduction).type_text("180s");
+    assert!(desk.shows("180s"));
+    let command = desk.begin().command_line();
+    assert!(command.contains("session.introduction_duration_s=180"), "{command}");
+    let session = &desk.setup.profile().session;
+    assert_eq!(session.introduction_duration_s, Some(180.0));
+}
+
+#[test]
 fn a_broken_profile_is_not_opened_and_not_in_the_way() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("broken.ron"), "(task: \"balance\", mode: both)").unwrap();

@@ -302,7 +302,8 @@ impl View<'_> {
         const ROOMY: u16 = 112;
         let chosen = &self.setup.profile.experiment;
         if pen.width() < ROOMY {
-            let mut part = pen.part(BESIDE + 1, 12, pen.width() - BESIDE - 2, 6);
+            // A gap keeps it apart from the words at its left.
+            let mut part = pen.part(BESIDE + 2, 12, pen.width() - BESIDE - 4, 6);
             self.moving(&mut part, chosen);
             return;
         }
