@@ -499,6 +499,21 @@ fn results_of_every_task() {
     }
 }
 
+/// The shortest session there is: nothing is said twice or in the wrong number.
+#[test]
+fn results_of_single_rollouts() {
+    let mut info = results();
+    info.rollouts.retain(|row| row.episode == 1);
+    info.start = None;
+    let mut state = results::State::default();
+    let first = results_picture(80, 24, &info, &state);
+    assert!(first.contains("1 rollout ") && !first.contains("1 rollouts"), "{first}");
+    assert!(first.lines().all(|line| line.split_whitespace().filter(|w| *w == "2").count() < 2));
+    state.next();
+    state.next();
+    insta::assert_snapshot!("results_single", results_picture(80, 24, &info, &state));
+}
+
 #[test]
 fn results_of_another_measure() {
     let mut info = results();

@@ -205,7 +205,8 @@ impl View<'_> {
     ) {
         match &self.ui.message {
             Some(message) => {
-                pen.text(1, y, message, Role::Alarm);
+                let room = usize::from(pen.width().saturating_sub(2));
+                pen.text(1, y, &super::text::cut(message, room), Role::Alarm);
             }
             None => otherwise(pen),
         }

@@ -195,9 +195,10 @@ fn statistics(info: &Info, phases: &[Phase]) -> Vec<String> {
         let squares = values.iter().map(|value| (value - average).powi(2)).sum::<f64>();
         let deviation = (squares / (real(values.len()) - 1.0)).sqrt();
         let line = format!(
-            "{:<13}{:>4} rollouts   mean {} {unit}   sd {} {unit}",
+            "{:<13}{:>4} {:<8}   mean {} {unit}   sd {} {unit}",
             live::phase_word(*phase),
             values.len(),
+            if values.len() == 1 { "rollout" } else { "rollouts" },
             fixed(average, 6, decimals),
             fixed(deviation, 5, decimals),
         );

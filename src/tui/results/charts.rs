@@ -222,11 +222,13 @@ fn legend(pen: &mut Pen<'_>, curves: &[Curve], title: &str) -> u16 {
     y + 1
 }
 
-/// An axis with three labels.
+/// An axis with three labels; without the middle one where it would read like an end.
 fn axis(scale: &Scale, style: Style) -> Axis<'static> {
     // A single point still needs an axis with a length.
     let to = if scale.to > scale.from { scale.to } else { scale.from + 1.0 };
-    let labels = [scale.from, f64::midpoint(scale.from, to), to]
-        .map(|value| Line::raw(format!("{value:.*}", scale.decimals).replace('-', "−")));
+    let [first, middle, last] = [scale.from, f64::midpoint(scale.from, to), to]
+        .map(|value| format!("{value:.*}", scale.decimals).replace('-', "−"));
+    let middle = if middle == first || middle == last { String::new() } else { middle };
+    let labels = [first, middle, last].map(Line::raw);
     Axis::default().style(style).bounds([scale.from, to]).labels(labels)
 }
