@@ -54,7 +54,7 @@ fn enter_plays_at_once_and_q_leaves() {
 
 #[test]
 fn every_task_is_played_on_a_terminal() {
-    for (task, seen) in [("swing-up", "DOWN SLOW"), ("speed-up", "beam"), ("mountain-car", "place")]
+    for (task, seen) in [("swing-up", "DOWN SLOW"), ("speed-up", "beam"), ("mountain-car", "flags")]
     {
         let line = format!("run {task} --seed 1 --phases main --set session.hold_s=0.1");
         let mut terminal = Seat::default().open(&line);
