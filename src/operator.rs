@@ -54,6 +54,16 @@ pub trait Operator: Send {
     /// The latest wish; never blocks. Called in the countdown too, where it has no effect.
     fn intent(&mut self, view: View<'_>) -> Intent;
 
+    /// What eyes and hand remember at a rollout's end, as numbers of the operator's own.
+    /// Empty for one that lives in the present.
+    fn memory(&mut self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// The rollout that just began goes on without a pause from one that ended with this
+    /// [`memory`](Self::memory).
+    fn go_on(&mut self, _memory: &[f64]) {}
+
     /// What came of the tick.
     fn told(&mut self, _feedback: &Feedback<'_>) {}
 }

@@ -23,7 +23,7 @@ pub mod sidecar;
 mod table;
 pub mod writer;
 
-pub use checkpoint::{Checkpoint, Resumed};
+pub use checkpoint::{Checkpoint, Momentum, Resumed};
 pub use error::Error;
 pub use evaluation::EvaluationRow;
 pub use folder::Folder;

@@ -67,8 +67,8 @@ pub trait Task: Send + Sync {
     fn region(&self, state: &State) -> usize;
 
     /// The scale that success has in main where it goes by what the person achieved in
-    /// introduction, as a mean reward; `None` where it does not.
-    fn own_scale(&self, _practised: f64) -> Option<Scale> {
+    /// introduction, as a mean reward (`None`: there was none); `None` where it does not.
+    fn own_scale(&self, _practised: Option<f64>) -> Option<OwnScale> {
         None
     }
 
@@ -86,6 +86,15 @@ pub trait Task: Send + Sync {
     fn action_limit(&self) -> f64;
 }
 
+/// A scale of success that goes by the person's own practice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnScale {
+    /// The scale in main.
+    pub scale: Scale,
+    /// How it was found, for `events.csv`.
+    pub why: String,
+}
+
 /// Counts through one rollout.
 pub trait Tally: Send {
     /// A control step from `state` to `next`.
@@ -93,6 +102,14 @@ pub trait Tally: Send {
 
     /// What was counted so far, in the order of [`Task::tally_names`].
     fn tallied(&self) -> Tallied;
+
+    /// What is under way and could go on in the next rollout.
+    fn unfinished(&self) -> Tallied {
+        Tallied::default()
+    }
+
+    /// Counts on from what was [`unfinished`](Self::unfinished) before.
+    fn go_on(&mut self, _unfinished: &Tallied) {}
 }
 
 /// The tally of a task whose time and reward say all.

@@ -168,6 +168,20 @@ impl Teacher {
         self.open.clear();
     }
 
+    /// What was seen of late, the newest last.
+    #[must_use]
+    pub fn seen(&self) -> Vec<Features> {
+        self.seen.iter().copied().collect()
+    }
+
+    /// The rollout that just began goes on from one of which this was [`seen`](Self::seen)
+    /// last.
+    pub fn go_on(&mut self, seen: &[Features]) {
+        self.seen.clear();
+        // Not more than a delay needs, whatever a checkpoint holds.
+        self.seen.extend(seen.iter().rev().take(self.delay_ticks + 1).rev());
+    }
+
     /// A control tick; returns the lesson that is ripe at it, if one is.
     pub fn see(&mut self, sight: &Sight) -> Option<Lesson> {
         if self.seen.len() > self.delay_ticks {
@@ -201,7 +215,8 @@ impl Teacher {
             Target::Human => action.0,
             Target::Executed => sight.applied,
         };
-        // Before the rollout's first tick the plant stood still where it was let go.
+        // Before a rollout's first tick the plant was held where it was let go, unless the
+        // rollout goes on from another.
         let is_delayed = self.is_delayed.get(sight.region).copied().unwrap_or(true);
         let seen = if is_delayed { self.seen.front() } else { self.seen.back() };
         let x = seen.copied().unwrap_or(sight.features);
@@ -305,6 +320,24 @@ mod tests {
         assert_eq!(teacher.see(&sight(50, Intent::fresh(0.0))), None);
         assert_eq!(teacher.close(false, 0.0).unwrap().x[0], 50.0);
         assert_eq!(teacher.close(false, 0.0), None);
+    }
+
+    #[test]
+    fn a_rollout_that_goes_on_remembers_what_was_seen_before() {
+        let params = Params { delay_s: 0.06, ..Params::default() };
+        let teacher = || Teacher::new(&params, Seconds(0.02), &["all"]);
+        let (mut whole, mut first) = (teacher(), teacher());
+        let see = |teacher: &mut Teacher, k| teacher.see(&sight(k, Intent::fresh(f64::from(k))));
+        for k in 0..9 {
+            see(&mut whole, k);
+            see(&mut first, k);
+        }
+        let mut second = teacher();
+        second.begin();
+        second.go_on(&first.seen());
+        for k in 9..15 {
+            assert_eq!(see(&mut second, k), see(&mut whole, k));
+        }
     }
 
     mod properties {

@@ -261,7 +261,8 @@ fn modern_sessions_of_every_task_are_refitted_to_the_byte() {
             "swing-up",
             "swing-up",
             "--duration 90 --set sharing.freeze=share_and_learner --set sharing.tau_steps=50 \
-             --set sharing.window_steps=50 --set teaching.target=executed",
+             --set sharing.window_steps=50 --set teaching.target=executed \
+             --set teaching.delay_s=0.2 --set rules.rollout_s=5.0",
         ),
         (
             "speed-up-modern",

@@ -532,6 +532,27 @@ fn a_swing_up_runs_on_without_a_return() {
     }
 }
 
+/// A hold does not end because a rollout's time does.
+#[test]
+fn a_hold_counts_on_where_a_swing_up_runs_on() {
+    let desk = Desk::new();
+    desk.succeed(
+        "run swing-up --headless --operator simulated:expert --seed 3 --duration 120 \
+         --phases main --set rules.rollout_s=2.0",
+    );
+    let folder = desk.at("logs/anon/001-swing-up-simultaneous");
+    let upright = 30_f64.to_radians().cos();
+    let (mut held, mut longest) = (0_u32, 0);
+    for row in rows(&folder.join("steps.csv")).iter().filter(|row| !row.is_ending()) {
+        held = if row.number("theta").cos() >= upright { held + 1 } else { 0 };
+        longest = longest.max(held);
+    }
+    let episodes = rows(&folder.join("episodes.csv"));
+    let told = episodes.iter().map(|row| row.number("longest_hold_s")).fold(0.0, f64::max);
+    assert!((told - f64::from(longest) * 0.02).abs() < 1e-9, "{told} is not {longest} steps");
+    assert!(told > 4.0, "{told} s: too short to go over a border for sure");
+}
+
 #[test]
 fn simulate_prints_the_plants_own_steps() {
     let desk = Desk::new();

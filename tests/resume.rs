@@ -167,7 +167,8 @@ fn goes_on_like_unbroken(task: &str, words: &str) {
 fn a_swing_up_that_runs_on_goes_on_after_a_kill() {
     goes_on_like_unbroken(
         "swing-up",
-        "--operator simulated:average --set session.main_duration_s=900",
+        "--operator simulated:average:mouse-limited --set session.main_duration_s=900 \
+         --set teaching.delay_s=0.1",
     );
 }
 

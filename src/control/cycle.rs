@@ -13,7 +13,7 @@ use crate::backend::{Backend, Sensed};
 use crate::clock::{Clock, Pacer, Wake};
 use crate::learner::{Learner, Model, Refusal};
 use crate::operator::{Feedback, Operator, View};
-use crate::record::{EpisodeRow, StepRow};
+use crate::record::{EpisodeRow, Momentum, StepRow};
 use crate::session::machine::{self, Event, Finish, Stage};
 use crate::session::plan::Plan;
 use crate::session::{Moment, Phase};
@@ -113,12 +113,12 @@ impl Default for Rollout {
     }
 }
 
-/// Where a rollout goes on that does not begin at the task's start.
-#[derive(Clone, Copy)]
+/// A rollout that does not begin at the task's start, and what it goes on with.
+#[derive(Clone)]
 pub(super) struct WentOn {
     pub(super) phase: Phase,
     pub(super) rollout: u32,
-    pub(super) state: State,
+    pub(super) momentum: Momentum,
 }
 
 /// A session under way.
@@ -158,7 +158,7 @@ impl<W: Witness> Cycle<W> {
         let sharing = Sharing::new(&rules.sharing, rules.mode, crew.task.regions());
         let mind = Mind { learner, sharing, learned: 0, refused: 0, tenths: 0 };
         let moment = from.as_ref().map(|(standing, _)| standing.moment);
-        let goes_on = from.as_ref().is_some_and(|(standing, _)| standing.state.is_some());
+        let goes_on = from.as_ref().is_some_and(|(standing, _)| standing.momentum.is_some());
         let (stage, effects) = machine::begin(&rules.plan, moment, goes_on);
         let names: Vec<&str> = crew.task.regions().iter().map(|region| region.name).collect();
         let teacher = Teacher::new(&rules.teaching, rules.tick, &names);
@@ -204,7 +204,7 @@ impl<W: Witness> Cycle<W> {
         self.mind.refused = standing.refused;
         self.practice = standing.practice;
         let Moment { phase, rollout, .. } = standing.moment;
-        self.went_on = standing.state.map(|state| WentOn { phase, rollout, state });
+        self.went_on = standing.momentum.map(|momentum| WentOn { phase, rollout, momentum });
         self.mind.tenths = standing.tenths;
     }
 

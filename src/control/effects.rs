@@ -6,7 +6,7 @@ use super::witness::{Happening, Standing, Witness};
 use crate::backend::Backend;
 use crate::learner::Learner;
 use crate::operator::Practice;
-use crate::record::{EpisodeRow, StepRow};
+use crate::record::{EpisodeRow, Momentum, StepRow};
 use crate::session::machine::{self, Effect, Event, Stage};
 use crate::session::plan::Start;
 use crate::session::{Moment, Phase};
@@ -68,7 +68,7 @@ impl<W: Witness> Cycle<W> {
 
     fn enter(&mut self, phase: Phase) {
         if phase == Phase::Main {
-            let (regions, practised) = scale::regions(&*self.crew.task, &self.episodes);
+            let (regions, own_scale) = scale::regions(&*self.crew.task, &self.episodes);
             self.mind = Mind {
                 learner: self.rules.fresh.clone(),
                 sharing: Sharing::new(&self.rules.sharing, self.rules.mode, &regions),
@@ -76,12 +76,8 @@ impl<W: Witness> Cycle<W> {
                 refused: 0,
                 tenths: 0,
             };
-            if let (Some(mean), Some(region)) = (practised, regions.first()) {
-                let threshold = region.scale.threshold;
-                let cause = format!(
-                    "full success is a mean reward of {threshold}: introduction's was {mean}"
-                );
-                self.note("threshold", None, Some(phase), cause);
+            if let Some(why) = own_scale {
+                self.note("threshold", None, Some(phase), why);
             }
         }
         self.note("phase", None, Some(phase), String::new());
@@ -97,40 +93,58 @@ impl<W: Witness> Cycle<W> {
     /// that goes on began.
     fn prepare(&mut self, moment: Moment) {
         let task = &*self.crew.task;
-        let went_on = self
-            .went_on
-            .filter(|from| (from.phase, from.rollout) == (moment.phase, moment.rollout));
-        let start = match (went_on, self.rules.plan.start(&moment)) {
-            (Some(from), _) => from.state,
+        let momentum = self.momentum_of(moment);
+        let start = match (&momentum, self.rules.plan.start(&moment)) {
+            (Some(momentum), _) => momentum.state,
             (None, Start::Random(mut chance)) => {
                 task.random_start(occasion(moment.phase), &mut chance)
             }
             (None, Start::Grid { index, count }) => task.grid_start(index, count),
         };
         self.crew.backend.prepare(start, moment.place());
-        self.open(moment, start);
+        self.open(moment, start, momentum.as_ref());
     }
 
     /// A rollout begins where the one before ended, without a halt.
     fn go_on(&mut self, moment: Moment) {
-        let state = self.crew.backend.sense().state;
         let Moment { phase, rollout, .. } = moment;
-        self.went_on = Some(WentOn { phase, rollout, state });
+        let momentum = Momentum {
+            state: self.crew.backend.sense().state,
+            tally: self.rollout.tally.unfinished(),
+            seen: self.teacher.seen(),
+            operator: self.crew.operator.memory(),
+        };
         self.crew.backend.go_on(moment.place());
-        self.open(moment, state);
+        self.open(moment, momentum.state, Some(&momentum));
+        self.went_on = Some(WentOn { phase, rollout, momentum });
     }
 
-    /// Everyone begins anew with the rollout that starts at `start`.
-    fn open(&mut self, moment: Moment, start: State) {
+    /// What the rollout at `moment` goes on with, if it does not begin at the task's start.
+    fn momentum_of(&self, moment: Moment) -> Option<Momentum> {
+        let went_on = self.went_on.as_ref()?;
+        let is_it = (went_on.phase, went_on.rollout) == (moment.phase, moment.rollout);
+        is_it.then(|| went_on.momentum.clone())
+    }
+
+    /// The rollout that starts at `start` begins: for everyone anew, but for the `momentum`
+    /// of one that goes on.
+    fn open(&mut self, moment: Moment, start: State, momentum: Option<&Momentum>) {
         let task = &*self.crew.task;
         self.rollout =
             Rollout { start: task.start_value(&start), tally: task.tally(), ..Rollout::default() };
         self.seen.state = start;
         self.teacher.begin();
+        if let Some(momentum) = momentum {
+            self.rollout.tally.go_on(&momentum.tally);
+            self.teacher.go_on(&momentum.seen);
+        }
         self.before_rollout = None;
         if moment.phase.is_steered() {
             let practice = self.practice();
             self.crew.operator.begin(moment.place(), practice);
+            if let Some(momentum) = momentum {
+                self.crew.operator.go_on(&momentum.operator);
+            }
             if self.rules.plan.attended {
                 self.before_rollout = Some(self.mind.clone());
             }
@@ -255,10 +269,7 @@ impl<W: Witness> Cycle<W> {
             learned: self.mind.learned,
             refused: self.mind.refused,
             practice: self.practice,
-            state: self
-                .went_on
-                .filter(|from| (from.phase, from.rollout) == (moment.phase, moment.rollout))
-                .map(|from| from.state),
+            momentum: self.momentum_of(moment),
             tenths: self.mind.tenths,
         });
     }

@@ -68,13 +68,14 @@ impl<W: Witness> Cycle<W> {
     }
 
     /// The lessons of main's rollout that were not ripe yet, and the share where it moves
-    /// once an episode.
+    /// once an episode: a whole one, not one that the phase's time cut.
     pub(super) fn conclude_rollout(&mut self, moment: Moment, end: End, state: State) {
         let cost = self.crew.task.cost(&state);
         while let Some(lesson) = self.teacher.close(end == End::Failed, cost) {
             self.learn(&lesson);
         }
-        if self.rules.sharing.window_episodes.is_some() && moment.step > 0 {
+        let is_whole = moment.step > 0 && end != End::Time;
+        if self.rules.sharing.window_episodes.is_some() && is_whole {
             let region = self.crew.task.region(&state);
             let mean = self.rollout.total_measure / f64::from(moment.step);
             self.move_share(moment, region, mean);

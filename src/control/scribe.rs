@@ -114,7 +114,7 @@ impl Witness for Scribe {
             learned,
             refused,
             practice: standing.practice,
-            state: standing.state,
+            momentum: standing.momentum,
             tenths: standing.tenths,
             steps_bytes: 0,
             episodes_bytes: 0,
@@ -167,7 +167,7 @@ pub fn standing_of(checkpoint: Checkpoint<Model>, frozen: Option<Model>) -> Opti
         learned: checkpoint.learned,
         refused: checkpoint.refused,
         practice: checkpoint.practice,
-        state: checkpoint.state,
+        momentum: checkpoint.momentum,
         tenths: checkpoint.tenths,
     })
 }

@@ -1,10 +1,9 @@
 //! Who writes down what the cycle does: the recorder, or nobody.
 
 use crate::learner::Model;
-use crate::record::{EpisodeRow, StepRow};
+use crate::record::{EpisodeRow, Momentum, StepRow};
 use crate::session::{Moment, Phase};
 use crate::sharing::Sharing;
-use crate::signal::State;
 
 /// Everything that must be known to go on after a cut, at the start of a rollout.
 #[derive(Clone, Debug)]
@@ -21,8 +20,8 @@ pub struct Standing {
     pub refused: u64,
     /// Rollouts that the operator has steered.
     pub practice: u32,
-    /// Where the rollout goes on, if it does not begin at the task's start.
-    pub state: Option<State>,
+    /// What the rollout goes on with, if it does not begin at the task's start.
+    pub momentum: Option<Momentum>,
     /// Tenths of main whose policies are stored.
     pub tenths: u8,
 }

@@ -14,7 +14,7 @@ use super::writer::{Columns, Manner, Recorder};
 use super::{EpisodeRow, Error, EventRow, Storable, reader, table};
 use crate::session::Moment;
 use crate::sharing::Sharing;
-use crate::signal::State;
+use crate::signal::{Features, State, Tallied};
 
 /// All that a session needs to go on with the rollout at `moment`. The random streams
 /// follow from the seed and the moment.
@@ -36,15 +36,29 @@ pub struct Checkpoint<M> {
     pub refused: u64,
     /// Rollouts that the operator steered so far.
     pub practice: u32,
-    /// Where the next rollout goes on, if it does not begin at the task's start.
+    /// What the next rollout goes on with, if it does not begin at the task's start.
     #[serde(default)]
-    pub state: Option<State>,
+    pub momentum: Option<Momentum>,
     /// Tenths of main whose policies are written.
     pub tenths: u8,
     /// The length of `steps.csv` that belongs to this checkpoint; the writer fills it in.
     pub steps_bytes: u64,
     /// The length of `episodes.csv`; the writer fills it in.
     pub episodes_bytes: u64,
+}
+
+/// What goes over from a rollout into the next one where the plant does not return between
+/// them: to the motion the border means nothing.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Momentum {
+    /// Where the plant goes on.
+    pub state: State,
+    /// What the tally counts on from.
+    pub tally: Tallied,
+    /// What was seen of late, the newest last, for lessons with a delay.
+    pub seen: Vec<Features>,
+    /// What the operator's eyes and hand remember.
+    pub operator: Vec<f64>,
 }
 
 impl<M> Document for Checkpoint<M> {

@@ -26,8 +26,8 @@ pub struct Yardstick {
     pub more_is_better: bool,
     /// The least and the most that it can be, where both are known.
     pub range: Option<(f64, f64)>,
-    /// The number of a rollout.
-    pub of: fn(&EpisodeRow) -> f64,
+    /// The number of a rollout; none of one that was cut before it could be known.
+    pub of: fn(&EpisodeRow) -> Option<f64>,
 }
 
 /// The yardstick of `task`: balance time, pseudo-height, speed, or steps to the flag.
@@ -40,7 +40,7 @@ pub fn yardstick(task: &str) -> Yardstick {
         decimals: 2,
         more_is_better: true,
         range: None,
-        of: |row| row.duration_s,
+        of: |row| Some(row.duration_s),
     };
     match task {
         SwingUp::NAME => Yardstick {
@@ -48,7 +48,7 @@ pub fn yardstick(task: &str) -> Yardstick {
             name: "mean height",
             unit: "",
             range: Some((-1.0, 1.0)),
-            of: |row| tallied(row, 0),
+            of: |row| Some(tallied(row, 0)),
             ..balance
         },
         SpeedUp::NAME => Yardstick {
@@ -56,7 +56,7 @@ pub fn yardstick(task: &str) -> Yardstick {
             name: "mean speed",
             unit: "m/s",
             decimals: 3,
-            of: |row| tallied(row, 0),
+            of: |row| Some(tallied(row, 0)),
             ..balance
         },
         MountainCar::NAME => Yardstick {
@@ -65,7 +65,7 @@ pub fn yardstick(task: &str) -> Yardstick {
             unit: "",
             decimals: 0,
             more_is_better: false,
-            of: |row| f64::from(row.steps),
+            of: |row| (row.end != End::Time).then_some(f64::from(row.steps)),
             ..balance
         },
         _ => balance,
@@ -111,8 +111,9 @@ pub enum Achieved {
     },
     /// The car was driven up.
     MountainCar {
-        /// The mean number of steps; the cap where the flag was not reached.
-        mean_steps: f64,
+        /// The mean number of steps, the cap where the flag was not reached; none where
+        /// the phase's time cut every rollout.
+        mean_steps: Option<f64>,
         /// Its standard deviation over the rollouts (n − 1); none for a single one.
         sd_steps: Option<f64>,
         /// The mean over the rollouts of each one's mean reward (eq. 35).
@@ -126,7 +127,7 @@ impl Achieved {
     /// What `rows`, at least one, came to in `task`.
     #[must_use]
     pub fn of(task: &str, rows: &[&EpisodeRow]) -> Self {
-        let values: Vec<f64> = rows.iter().map(|row| (yardstick(task).of)(row)).collect();
+        let values: Vec<f64> = rows.iter().filter_map(|row| (yardstick(task).of)(row)).collect();
         let sd = deviation(&values);
         let ended = |end| rows.iter().filter(|row| row.end == end).count();
         match task {
@@ -155,7 +156,7 @@ impl Achieved {
                 }
             }
             MountainCar::NAME => Self::MountainCar {
-                mean_steps: mean(&values),
+                mean_steps: (!values.is_empty()).then(|| mean(&values)),
                 sd_steps: sd,
                 mean_reward: mean(&rows.iter().map(|row| row.mean_reward).collect::<Vec<_>>()),
                 solved: ended(End::Goal),
@@ -168,13 +169,13 @@ impl Achieved {
         }
     }
 
-    /// The number that [`yardstick`] names, over all rollouts.
+    /// The number that [`yardstick`] names, over all rollouts of which it is known.
     #[must_use]
-    pub const fn mean(&self) -> f64 {
+    pub const fn mean(&self) -> Option<f64> {
         match *self {
-            Self::Balance { mean_balance_s, .. } => mean_balance_s,
-            Self::SwingUp { mean_height, .. } => mean_height,
-            Self::SpeedUp { mean_speed, .. } => mean_speed,
+            Self::Balance { mean_balance_s, .. } => Some(mean_balance_s),
+            Self::SwingUp { mean_height, .. } => Some(mean_height),
+            Self::SpeedUp { mean_speed, .. } => Some(mean_speed),
             Self::MountainCar { mean_steps, .. } => mean_steps,
         }
     }
@@ -209,11 +210,14 @@ impl Achieved {
                 spread(sd, 3),
                 if end_hits == 1 { "" } else { "s" }
             ),
-            Self::MountainCar { mean_steps: mean, sd_steps: sd, solved, .. } => write!(
+            Self::MountainCar { mean_steps: Some(mean), sd_steps: sd, solved, .. } => write!(
                 line,
                 "{mean:.0}{} steps {over}, the flag reached in {solved}",
                 spread(sd, 0)
             ),
+            Self::MountainCar { mean_steps: None, .. } => {
+                write!(line, "no flag reached {over}, cut by the time of its phase")
+            }
         };
         line
     }

@@ -90,9 +90,11 @@ pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
             return Ok(signal_code(shutdown.signal().unwrap_or_default()));
         };
         let Some(alone) = Alone::of(task, &rows, Phase::Autonomous) else { continue };
-        let first = tenths.first().map_or(&alone, |tenth| &tenth.alone).measures.achieved.mean();
-        let improvement_percent =
-            improvement(&yardstick(task), first, alone.measures.achieved.mean());
+        let mean = |alone: &Alone| alone.measures.achieved.mean();
+        let first = mean(tenths.first().map_or(&alone, |tenth| &tenth.alone));
+        let improvement_percent = first
+            .zip(mean(&alone))
+            .and_then(|(first, value)| improvement(&yardstick(task), first, value));
         tenths.push(Tenth { percent, alone, improvement_percent });
     }
     let alone = Alone::of(task, &rows, Phase::Autonomous);
@@ -209,7 +211,8 @@ impl Alone {
             Phase::ZeroControl => phases.zero_control,
             _ => phases.autonomous,
         }?;
-        let values: Vec<f64> = metrics::rollouts_of(rows, phase).map(yardstick(task).of).collect();
+        let values: Vec<f64> =
+            metrics::rollouts_of(rows, phase).filter_map(yardstick(task).of).collect();
         Some(Self { measures, median: median(&values), interval95: interval95(&values) })
     }
 
@@ -241,7 +244,7 @@ impl Evaluation {
             lines.push(format!("after each tenth of main: {name}{unit}"));
         }
         for tenth in &self.tenths {
-            let mean = tenth.alone.measures.achieved.mean();
+            let mean = tenth.alone.measures.achieved.mean().unwrap_or(f64::NAN);
             let (low, high) = tenth.alone.interval95.unwrap_or((mean, mean));
             let better = tenth
                 .improvement_percent

@@ -205,10 +205,10 @@ fn evaluation(
 fn tenth_means(task: &str, tenths: &[(u8, Model)], rows: &[(u8, EpisodeRow)]) -> Vec<(u8, f64)> {
     tenths
         .iter()
-        .map(|(percent, _)| {
+        .filter_map(|(percent, _)| {
             let of_it: Vec<&EpisodeRow> =
                 rows.iter().filter(|(of, _)| of == percent).map(|(_, row)| row).collect();
-            (*percent, Achieved::of(task, &of_it).mean())
+            Some((*percent, Achieved::of(task, &of_it).mean()?))
         })
         .collect()
 }

@@ -5,7 +5,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{Occasion, Tally, Task, steps_of};
+use super::{Occasion, OwnScale, Tally, Task, steps_of};
 use crate::check::{Check, Checker};
 use crate::plant::ball_beam::{self, BallBeam};
 use crate::sharing::region::{Region, Scale};
@@ -28,6 +28,8 @@ pub struct Params {
     /// `R_threshold` as a part of the operator's own mean reward in introduction, where
     /// there was one; `None`: the constant above (ours).
     pub threshold_of_own: Option<f64>,
+    /// But `R_threshold` is at least this, m/s.
+    pub threshold_least_m_s: f64,
     /// Whether the learner sees θ̇, too (eq. 26).
     pub use_theta_dot: bool,
     /// Every other test begins with the ball rolling this fast, to one side and the other
@@ -46,6 +48,7 @@ impl Default for Params {
             reward_min_m_s: 0.0,
             reward_threshold_m_s: 0.10,
             threshold_of_own: None,
+            threshold_least_m_s: 0.05,
             use_theta_dot: false,
             test_push_m_s: 0.05,
             test_rest_m: 0.02,
@@ -68,7 +71,14 @@ impl Check for Params {
         );
         if let Some(part) = self.threshold_of_own {
             c.range("threshold_of_own", part, 0.01..=10.0);
+            c.demand(
+                self.threshold_least_m_s > self.reward_min_m_s,
+                "threshold_least_m_s",
+                self.threshold_least_m_s,
+                "above reward_min_m_s, where success is 0",
+            );
         }
+        c.range("threshold_least_m_s", self.threshold_least_m_s, -10.0..=10.0);
         c.range("test_push_m_s", self.test_push_m_s, 0.0..=1.0);
         c.range("test_rest_m", self.test_rest_m, 0.0..=1.0);
     }
@@ -186,11 +196,26 @@ impl Task for SpeedUp {
         0
     }
 
-    fn own_scale(&self, practised: f64) -> Option<Scale> {
-        let threshold = self.rules.threshold_of_own? * practised;
-        // Who only ran over the ends in practice is measured by the constant.
-        let minimum = self.rules.reward_min_m_s;
-        (threshold > minimum).then_some(Scale { minimum, threshold })
+    fn own_scale(&self, practised: Option<f64>) -> Option<OwnScale> {
+        let rules = &self.rules;
+        let part = rules.threshold_of_own?;
+        let (threshold, why) = match practised {
+            None => {
+                let constant = rules.reward_threshold_m_s;
+                (constant, "the constant: there was no introduction".to_owned())
+            }
+            // Else who hardly moved the ball in practice would hand over at once, for good.
+            Some(mean) if part * mean < rules.threshold_least_m_s => {
+                let least = rules.threshold_least_m_s;
+                (least, format!("the least: introduction's was {mean}"))
+            }
+            Some(mean) => (part * mean, format!("{part} of introduction's, which was {mean}")),
+        };
+        let scale = Scale { minimum: rules.reward_min_m_s, threshold };
+        Some(OwnScale {
+            scale,
+            why: format!("full success is a mean reward of {threshold} m/s, {why}"),
+        })
     }
 
     fn tally_names(&self) -> &'static [&'static str] {
@@ -278,11 +303,18 @@ mod tests {
 
     #[test]
     fn the_threshold_can_follow_the_operators_own_practice() {
-        assert_eq!(task(&Params::default()).own_scale(0.2), None);
+        assert_eq!(task(&Params::default()).own_scale(Some(0.2)), None);
         let own = task(&Params { threshold_of_own: Some(0.8), ..Params::default() });
-        let scale = own.own_scale(0.2).unwrap();
-        assert!((scale.threshold - 0.16).abs() < 1e-15 && scale.minimum == 0.0);
-        assert_eq!(own.own_scale(-0.3), None);
+        for (practised, threshold, why) in [
+            (Some(0.2), 0.16, "0.8 of introduction's"),
+            (Some(0.001), 0.05, "the least"),
+            (Some(-0.3), 0.05, "the least"),
+            (None, 0.1, "no introduction"),
+        ] {
+            let found = own.own_scale(practised).unwrap();
+            assert!((found.scale.threshold - threshold).abs() < 1e-15, "{found:?}");
+            assert!(found.scale.minimum == 0.0 && found.why.contains(why), "{found:?}");
+        }
     }
 
     #[test]

@@ -278,17 +278,21 @@ impl Task for SwingUp {
         height(state)
     }
 
-    /// Below the top, how far the pole's energy is from that of standing upright, in
-    /// heights; at the top the squared distance from standing at rest, rad², as in balance.
+    /// Below the top, how far the pole's energy is from that of standing upright, in heights
+    /// of half the pole's way up. Towards upright that passes into half the square of the
+    /// part that falls over by itself, θ + θ̇/ω: 0 for a pole that just comes to rest there.
+    /// At rest both are the missing height, and both vanish on the way to rest upright.
     fn cost(&self, state: &State) -> f64 {
-        let (cos, speed) = (height(state), speed(state));
-        let kinetic = speed * speed / (2.0 * self.omega_squared);
-        if cos >= self.borders.top_fast {
-            let tilt = cos.clamp(-1.0, 1.0).acos();
-            tilt * tilt + 2.0 * kinetic
-        } else {
-            (kinetic + cos - 1.0).abs()
-        }
+        let &[_, _, theta, theta_dot] = &state[..] else { return f64::NAN };
+        // With q = 2 sin θ/2 in place of θ that holds for tilts of any size.
+        let (sin, cos) = (theta / 2.0).sin_cos();
+        let q = 2.0 * sin * cos.signum();
+        let p = theta_dot / self.omega_squared.sqrt();
+        let energy = (p * p - q * q) / 2.0;
+        let falls = (p + q) * (p + q) / 2.0;
+        let border = self.borders.top_fast;
+        let nearness = ((theta.cos() - border) / (1.0 - border)).clamp(0.0, 1.0);
+        energy.abs() + nearness * (falls - energy.abs())
     }
 
     fn end(&self, state: &State, steps: u32, occasion: Occasion) -> Option<End> {
@@ -350,7 +354,7 @@ impl Tally for Heights {
         self.steps += 1;
         self.sum += cos;
         self.at_top += u32::from(self.borders.region(cos, speed(state)) >= 4);
-        self.held = if cos >= self.hold_cos { self.held + 1 } else { 0 };
+        self.held = if cos >= self.hold_cos { self.held.saturating_add(1) } else { 0 };
         self.longest = self.longest.max(self.held);
     }
 
@@ -358,6 +362,21 @@ impl Tally for Heights {
         let steps = f64::from(self.steps.max(1));
         let longest = f64::from(self.longest) * self.tick;
         Tallied::new([self.sum / steps, f64::from(self.at_top) / steps, longest])
+    }
+
+    /// The steps of the hold under way.
+    fn unfinished(&self) -> Tallied {
+        Tallied::new([f64::from(self.held)])
+    }
+
+    fn go_on(&mut self, unfinished: &Tallied) {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a count of steps; nonsense saturates"
+        )]
+        let held = unfinished.first().copied().unwrap_or(0.0) as u32;
+        self.held = held;
     }
 }
 
@@ -430,6 +449,27 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_hold_counts_on_in_a_rollout_that_goes_on() {
+        let task = task();
+        let (up, down) = (at(5.0, 0.0), at(180.0, 0.0));
+        let mut before = task.tally();
+        for state in [&up, &down, &up, &up, &up] {
+            before.step(state, state);
+        }
+        let mut after = task.tally();
+        after.go_on(&before.unfinished());
+        assert_eq!(after.tallied()[2], 0.0, "it is this rollout's once it holds in it");
+        after.step(&up, &up);
+        after.step(&down, &up);
+        assert!((after.tallied()[2] - 0.08).abs() < 1e-12);
+        assert_eq!(after.unfinished()[0], 0.0);
+        let mut fallen = task.tally();
+        fallen.go_on(&before.unfinished());
+        fallen.step(&down, &down);
+        assert_eq!(fallen.tallied()[2], 0.0);
+    }
+
     /// Eq. 9: success is 0 at a region's lowest height and 1 at its goal's.
     #[test]
     fn success_runs_from_the_lowest_height_of_a_region_to_its_goal() {
@@ -483,6 +523,39 @@ mod tests {
         assert_eq!(task.end(&taught, 1000, Occasion::Tested), None);
         assert_eq!(task.end(&taught, 1500, Occasion::Tested), Some(End::Cap));
         assert_eq!(task.end(&at(f64::NAN, 0.0), 1, Occasion::Tested), Some(End::Failed));
+    }
+
+    /// No border of a region, nor a whole turn, is a reward or a punishment by itself.
+    #[test]
+    fn the_cost_has_no_jumps() {
+        let task = task();
+        for step in -800..800 {
+            for speed in [-12.0, -4.0, -1.0, 0.0, 0.5, 1.0, 3.0, 8.0] {
+                let degrees = f64::from(step) * 0.5;
+                let cost = |more: f64| task.cost(&at(degrees + more, speed));
+                let jump = (cost(1e-7) - cost(-1e-7)).abs();
+                assert!(jump < 1e-6, "{degrees}°, {speed} rad/s: {jump}");
+                let turned = (cost(360.0) - cost(0.0)).abs();
+                assert!(turned < 1e-9, "{degrees}°, {speed} rad/s: {turned}");
+            }
+        }
+    }
+
+    /// A pole that swings up to rest upright has no cost on all of its way; one that swings
+    /// away from there has, as long as it is at the top.
+    #[test]
+    fn the_way_up_costs_nothing_and_falling_away_does() {
+        let task = task();
+        for degrees in [5.0, 15.0, 25.0, 35.0, 60.0, 120.0_f64] {
+            let half = (degrees.to_radians() / 2.0).sin();
+            let speed = 2.0 * half * task.omega_squared.sqrt();
+            assert!(task.cost(&at(degrees, -speed)) < 1e-12, "{degrees}");
+            assert!(task.cost(&at(-degrees, speed)) < 1e-12, "{degrees}");
+            let falls = task.cost(&at(degrees, speed));
+            assert!((falls > 1e-3) == (degrees < 40.0), "{degrees}: {falls}");
+            let at_rest = 1.0 - degrees.to_radians().cos();
+            assert!((task.cost(&at(degrees, 0.0)) - at_rest).abs() < 1e-12, "{degrees}");
+        }
     }
 
     /// Pumping lowers the cost from hanging on; standing upright has none.

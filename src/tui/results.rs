@@ -70,7 +70,7 @@ impl Info {
 
     /// The measure of the rollouts of `phase` that count.
     fn measured(&self, phase: Phase) -> Vec<f64> {
-        self.of(phase).map(self.measure.of).collect()
+        self.of(phase).filter_map(self.measure.of).collect()
     }
 
     /// The pages' titles.

@@ -107,7 +107,7 @@ pub fn checkpoint(rollout: u32) -> Box<Checkpoint<Model>> {
         learned: 3,
         refused: 0,
         practice: rollout,
-        state: None,
+        momentum: None,
         tenths: 0,
         steps_bytes: 0,
         episodes_bytes: 0,

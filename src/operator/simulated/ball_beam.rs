@@ -66,6 +66,14 @@ impl Operator for Roller {
     fn intent(&mut self, view: View<'_>) -> Intent {
         self.0.intent(view)
     }
+
+    fn memory(&mut self) -> Vec<f64> {
+        self.0.memory()
+    }
+
+    fn go_on(&mut self, memory: &[f64]) {
+        self.0.go_on(memory);
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -191,6 +199,10 @@ impl Judgement<4> for Rolling {
             *model = foresight(delay, self.tick, &self.imagined);
             self.look_ahead = (ahead - delay.0).max(0.0);
         }
+    }
+
+    fn numbers(&mut self) -> Vec<&mut f64> {
+        vec![self.x_error.number(), self.x_dot_error.number(), &mut self.theta, &mut self.way]
     }
 
     fn wish(&mut self, past: [f64; 4], done: &DelayLine<1>, rng: &mut ChaCha8Rng) -> f64 {

@@ -68,6 +68,14 @@ impl Operator for Balancer {
     fn intent(&mut self, view: View<'_>) -> Intent {
         self.0.intent(view)
     }
+
+    fn memory(&mut self) -> Vec<f64> {
+        self.0.memory()
+    }
+
+    fn go_on(&mut self, memory: &[f64]) {
+        self.0.go_on(memory);
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -86,6 +94,10 @@ impl Judgement<4> for Balancing {
         if let Some(model) = &mut self.model {
             model.renew(delay);
         }
+    }
+
+    fn numbers(&mut self) -> Vec<&mut f64> {
+        self.law.numbers()
     }
 
     fn wish(&mut self, past: [f64; 4], done: &DelayLine<1>, rng: &mut ChaCha8Rng) -> f64 {

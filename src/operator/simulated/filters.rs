@@ -64,6 +64,17 @@ impl<const N: usize> DelayLine<N> {
     }
 }
 
+impl<const N: usize> DelayLine<N> {
+    /// All that it remembers, the oldest first.
+    pub(super) fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
+        let len = self.rows.len();
+        self.rows.rotate_left((self.newest + 1) % len);
+        self.newest = len - 1;
+        self.empty = false;
+        self.rows.as_flattened_mut().iter_mut()
+    }
+}
+
 /// A lag of first order: the output follows the input with a time constant.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lag {
@@ -80,6 +91,11 @@ impl Lag {
     pub(super) fn follow(&mut self, input: f64) -> f64 {
         self.value += self.gain * (input - self.value);
         self.value
+    }
+
+    /// All that it remembers.
+    pub(super) const fn number(&mut self) -> &mut f64 {
+        &mut self.value
     }
 }
 
@@ -104,6 +120,11 @@ impl Wander {
     pub(super) fn next(&mut self, rng: &mut impl Rng) -> f64 {
         self.value = self.keep * self.value + (1.0 - self.keep * self.keep).sqrt() * normal(rng);
         self.value
+    }
+
+    /// All that it remembers.
+    pub(super) const fn number(&mut self) -> &mut f64 {
+        &mut self.value
     }
 }
 

@@ -89,6 +89,11 @@ impl Law {
         self.theta_dot_error.restart(rng);
     }
 
+    /// All that it remembers.
+    pub(super) fn numbers(&mut self) -> Vec<&mut f64> {
+        vec![self.theta_error.number(), self.theta_dot_error.number()]
+    }
+
     pub(super) fn renew(&mut self, skill: f64) {
         let (n, own) = (&self.numbers, &self.factors);
         let blur = if self.is_predictor { at_least_0(n.model_noise_factor, skill) } else { 1.0 };

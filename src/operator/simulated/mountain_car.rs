@@ -68,6 +68,14 @@ impl Operator for Driver {
     fn intent(&mut self, view: View<'_>) -> Intent {
         self.0.intent(view)
     }
+
+    fn memory(&mut self) -> Vec<f64> {
+        self.0.memory()
+    }
+
+    fn go_on(&mut self, memory: &[f64]) {
+        self.0.go_on(memory);
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -151,6 +159,10 @@ impl Judgement<2> for Driving {
             *model = foresight(delay, self.tick, &self.plant);
             self.lead_steps = (self.lead_steps - delay.0 / self.tick.0).max(0.0);
         }
+    }
+
+    fn numbers(&mut self) -> Vec<&mut f64> {
+        vec![self.v_error.number(), &mut self.pause_left, &mut self.way]
     }
 
     fn wish(&mut self, past: [f64; 2], done: &DelayLine<1>, rng: &mut ChaCha8Rng) -> f64 {

@@ -26,6 +26,10 @@ pub(super) trait Judgement<const N: usize> {
     /// The skill, and how late the state is seen, from now on.
     fn renew(&mut self, skill: f64, delay: Seconds);
 
+    /// The numbers by which it remembers what was before the rollout, where one goes on
+    /// from another.
+    fn numbers(&mut self) -> Vec<&mut f64>;
+
     /// What the person decides on, from the state as it was a delay ago and what the hand
     /// did since. Habits act on this.
     fn wish(&mut self, past: [f64; N], done: &DelayLine<1>, rng: &mut ChaCha8Rng) -> f64;
@@ -238,6 +242,38 @@ impl<const N: usize, J: Judgement<N>> Person<N, J> {
         Intent::fresh(action)
     }
 
+    /// See [`Operator::memory`](crate::operator::Operator::memory).
+    pub(super) fn memory(&mut self) -> Vec<f64> {
+        self.numbers().into_iter().map(|number| *number).collect()
+    }
+
+    /// See [`Operator::go_on`](crate::operator::Operator::go_on). The chance is that of the
+    /// new rollout; a memory of somebody else's is none.
+    pub(super) fn go_on(&mut self, memory: &[f64]) {
+        let numbers = self.numbers();
+        if numbers.len() == memory.len() {
+            for (number, remembered) in numbers.into_iter().zip(memory) {
+                *number = *remembered;
+            }
+        }
+    }
+
+    /// All that eyes, head and hand remember.
+    fn numbers(&mut self) -> Vec<&mut f64> {
+        let body = &mut self.body;
+        let mut numbers = self.judgement.numbers();
+        numbers.extend([
+            body.tremor.number(),
+            body.hand.number(),
+            body.sustained.number(),
+            &mut body.left,
+            &mut body.decision,
+        ]);
+        numbers.extend(self.seen.numbers());
+        numbers.extend(self.done.numbers());
+        numbers
+    }
+
     /// Lets the skill grow with the time steered. It depends on nothing but the practice
     /// before the rollout and the time within, so that a resumed session repeats it.
     fn practise(&mut self, rollout_time: Seconds) {
@@ -319,6 +355,10 @@ mod tests {
             self.0 = skill;
         }
 
+        fn numbers(&mut self) -> Vec<&mut f64> {
+            Vec::new()
+        }
+
         fn wish(&mut self, _: [f64; 1], _: &DelayLine<1>, _: &mut ChaCha8Rng) -> f64 {
             self.0
         }
@@ -376,6 +416,53 @@ mod tests {
             for rollout_time in [0.0, 500.0] {
                 let shown = shown_at(&mut person, rollout_time);
                 assert!((shown - (0.7 - 0.65 * left)).abs() < 1e-12, "{rollouts}: {shown}");
+            }
+        }
+    }
+
+    /// Does what it sees, late.
+    struct Echo;
+
+    impl Judgement<1> for Echo {
+        fn begin(&mut self, _rng: &mut ChaCha8Rng) {}
+
+        fn renew(&mut self, _skill: f64, _delay: Seconds) {}
+
+        fn numbers(&mut self) -> Vec<&mut f64> {
+            Vec::new()
+        }
+
+        fn wish(&mut self, past: [f64; 1], _: &DelayLine<1>, _: &mut ChaCha8Rng) -> f64 {
+            past[0]
+        }
+    }
+
+    /// Chance apart, nobody could tell from the actions where one rollout ended and the next
+    /// one began.
+    #[test]
+    fn a_person_whose_rollout_goes_on_remembers_what_was_before() {
+        let params = Params { lag_s: 0.1, ..calm() };
+        for kind in [Kind::DelayedPd, Kind::MouseLimited] {
+            let make = || {
+                let character = params.character(Skill::Average, 1.0, 1e6);
+                let mut person = Person::new(character, kind, 1, TICK, |_| Echo);
+                person.begin(Place::default(), Practice::default());
+                person
+            };
+            let act = |person: &mut Person<1, Echo>, k: u32| {
+                let state = State::new([f64::from(k * k)]);
+                let zero = Seconds(0.0);
+                person.intent(View { state: &state, now: zero, rollout_time: zero }).action().0
+            };
+            let (mut whole, mut first, mut second) = (make(), make(), make());
+            for k in 0..31 {
+                assert_eq!(act(&mut whole, k), act(&mut first, k));
+            }
+            second.begin(Place { rollout: 2, ..Place::default() }, Practice::default());
+            second.go_on(&first.memory());
+            second.go_on(&[1.0, 2.0]); // somebody else's
+            for k in 31..60 {
+                assert_eq!(act(&mut second, k), act(&mut whole, k), "{kind} {k}");
             }
         }
     }

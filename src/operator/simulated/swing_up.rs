@@ -77,6 +77,14 @@ impl Operator for Swinger {
     fn intent(&mut self, view: View<'_>) -> Intent {
         self.0.intent(view)
     }
+
+    fn memory(&mut self) -> Vec<f64> {
+        self.0.memory()
+    }
+
+    fn go_on(&mut self, memory: &[f64]) {
+        self.0.go_on(memory);
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -166,6 +174,10 @@ impl Judgement<4> for Swinging {
         self.model.renew(delay);
         self.catch = at(p.catch_deg, skill).to_radians();
         self.catch_speed = at(p.catch_deg_s, skill).to_radians();
+    }
+
+    fn numbers(&mut self) -> Vec<&mut f64> {
+        self.law.numbers()
     }
 
     fn wish(&mut self, past: [f64; 4], done: &DelayLine<1>, rng: &mut ChaCha8Rng) -> f64 {

@@ -213,6 +213,9 @@ struct Replay<'a> {
     teacher: Teacher,
     sharing: Sharing,
     by_episode: bool,
+    returns: bool,
+    /// How the rollout before ended.
+    before: Option<End>,
     total_measure: f64,
 }
 
@@ -230,6 +233,8 @@ impl<'a> Replay<'a> {
             teacher: Teacher::new(&profile.teaching, profile.tick(), &names),
             sharing: Sharing::new(&profile.sharing, sidecar.mode, &regions),
             by_episode: profile.sharing.window_episodes.is_some(),
+            returns: profile.session.returns,
+            before: None,
             total_measure: 0.0,
         }
     }
@@ -240,17 +245,22 @@ impl<'a> Replay<'a> {
         let cost = self.task.cost(&row.state);
         let region = self.task.region(&row.state);
         if row.step == 0 {
+            let seen = self.teacher.seen();
             self.teacher.begin();
+            if self.before == Some(End::Cap) && !self.returns {
+                self.teacher.go_on(&seen);
+            }
             self.total_measure = 0.0;
         }
         let (Some(applied), Some(reward)) = (row.u_applied, row.reward) else {
+            self.before = Some(end);
             if end == End::Aborted {
                 return;
             }
             while let Some(lesson) = self.teacher.close(end == End::Failed, cost) {
                 learn(lesson);
             }
-            if self.by_episode && row.step > 0 {
+            if self.by_episode && row.step > 0 && end != End::Time {
                 self.sharing.observe(region, self.total_measure / f64::from(row.step));
             }
             return;

@@ -124,7 +124,7 @@ fn tallied(view: &View<'_>, index: usize) -> f64 {
 /// The yardstick of each rollout of the phase so far.
 fn measured(view: &View<'_>) -> Vec<f64> {
     let of = yardstick(&view.info.task).of;
-    rollouts_of(&view.history.rollouts, view.phase()).map(of).collect()
+    rollouts_of(&view.history.rollouts, view.phase()).filter_map(of).collect()
 }
 
 fn left(pen: &mut Pen<'_>, y: u16, label: &str, value: &str, role: Role) {

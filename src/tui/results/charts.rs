@@ -148,7 +148,7 @@ fn starts(pen: &mut Pen<'_>, info: &Info) {
         let at = |row: &EpisodeRow| {
             info.start.map_or_else(|| f64::from(row.episode), |start| (start.value)(row))
         };
-        info.of(phase).map(|row| (at(row), (info.measure.of)(row))).collect()
+        info.of(phase).filter_map(|row| Some((at(row), (info.measure.of)(row)?))).collect()
     };
     let (robot, nobody) = (points(Phase::Autonomous), points(Phase::ZeroControl));
     let all = || robot.iter().chain(&nobody);
@@ -182,7 +182,7 @@ fn numbered(values: &[f64], before: f64) -> Points {
 fn chart(pen: &mut Pen<'_>, curves: &[Curve], x: &Scale, y: &Scale) {
     let (width, height) = (pen.width(), pen.height());
     if curves.iter().all(|curve| curve.points.is_empty()) {
-        pen.centred(height / 2, "nothing here: this phase did not take place", Role::Dim);
+        pen.centred(height / 2, "nothing here: no rollout came to its end", Role::Dim);
         return;
     }
     let rows = legend(pen, curves, &format!("{} by {}", y.title, x.title));
