@@ -122,6 +122,50 @@ fn wrong_profiles_are_shown_with_a_caret() {
 }
 
 #[test]
+fn rules_that_a_plant_cannot_keep_name_both() {
+    let desk = Desk::new();
+    for (task, set, says) in [
+        ("speed-up", "rules.limit_m=0.3", "plant.beam_half_length_m, 0.2125"),
+        ("speed-up", "rules.test_rest_m=0.5", "plant.beam_half_length_m"),
+        ("mountain-car", "rules.start_x=-1.5", "plant.left_wall, -1.2"),
+        ("mountain-car", "rules.start_x=0.5", "plant.goal, 0.5"),
+        ("mountain-car", "rules.goal_reward=-2", "above step_reward"),
+    ] {
+        let key = set.split('=').next().unwrap();
+        refuses(&desk, &format!("run {task} --headless --set {set}"), &[key, says]);
+    }
+    // Without a middle that is the one fault; its goals are not named as well.
+    let message = refuses_words(
+        &desk,
+        &[
+            "run",
+            "swing-up",
+            "--headless",
+            "--set",
+            "rules.down_deg=60",
+            "--set",
+            "rules.top_slow_deg=90",
+        ],
+        &["rules.down_deg", "no middle"],
+    );
+    assert!(!message.contains("middle_slow_goal_deg"), "{message}");
+}
+
+/// The constant stands, and that is said, where a scale should go by a practice that does
+/// not take place.
+#[test]
+fn a_threshold_of_own_practice_without_practice_is_told() {
+    let desk = Desk::new();
+    let line = "run speed-up-modern --headless --operator none --seed 1 --rollouts 1 --phases main";
+    let output = desk.run(line);
+    let said = text(&output.stderr);
+    assert!(output.status.success() && said.contains("no introduction"), "{said}");
+    let events = desk.at("logs/anon/001-speed-up-simultaneous/events.csv");
+    let events = fs::read_to_string(events).unwrap();
+    assert!(events.contains("threshold") && events.contains("no introduction"), "{events}");
+}
+
+#[test]
 fn unknown_words_are_told_what_is_known() {
     let desk = Desk::new();
     let run = "run balance --headless --seed 1";

@@ -209,6 +209,34 @@ impl Check for Experiment {
         for (name, section) in self.sections() {
             section.check(&mut c.section(name));
         }
+        self.check_fit(&mut c.section("rules"));
+    }
+}
+
+impl Experiment {
+    /// Rules that the plant cannot keep.
+    fn check_fit(&self, c: &mut Checker<'_>) {
+        match self {
+            Self::SpeedUp { plant, rules, .. } => {
+                let half = plant.beam_half_length_m;
+                let allowed = format!("at most plant.beam_half_length_m, {half}");
+                for (key, distance) in
+                    [("limit_m", rules.limit_m), ("test_rest_m", rules.test_rest_m)]
+                {
+                    c.demand(distance <= half, key, distance, &allowed);
+                }
+            }
+            Self::MountainCar { plant, rules, .. } => {
+                let hill::Params { left_wall, goal, .. } = *plant;
+                c.demand(
+                    (left_wall..goal).contains(&rules.start_x),
+                    "start_x",
+                    rules.start_x,
+                    &format!("between plant.left_wall, {left_wall}, and plant.goal, {goal}"),
+                );
+            }
+            Self::Balance { .. } | Self::SwingUp { .. } => {}
+        }
     }
 }
 

@@ -20,6 +20,8 @@ pub struct MainEnd {
     pub regions: Vec<RegionEnd>,
     /// Where the first region's gate opened.
     pub gate: Option<Opened>,
+    /// Whether there is a gate to open; without one its step means nothing.
+    pub has_gate: bool,
     /// Whether shares move once an episode: the gate's numbers count episodes then.
     pub by_episode: bool,
     /// Samples learned,
@@ -183,14 +185,15 @@ fn main_measures(task: &str, rows: &[EpisodeRow], end: &MainEnd) -> Option<MainM
 }
 
 fn gate(rows: &[EpisodeRow], end: &MainEnd) -> Gate {
+    let opened = end.gate.filter(|_| end.has_gate);
     if end.by_episode {
         Gate::Episodes {
-            gate_episode: end.gate.map(|gate| gate.step),
+            gate_episode: opened.map(|gate| gate.step),
             tau_episodes: end.gate.map(|gate| gate.tau),
         }
     } else {
         Gate::Steps {
-            gate_episode: end.gate.and_then(|gate| episode_of_step(rows, gate.step)),
+            gate_episode: opened.and_then(|gate| episode_of_step(rows, gate.step)),
             tau_steps: end.gate.map(|gate| gate.tau),
         }
     }
@@ -294,6 +297,7 @@ mod tests {
         let end = MainEnd {
             regions: vec![RegionEnd { name: "all".to_owned(), share: 0.5, success: 0.6 }],
             gate: Some(Opened { step: 61, tau: 66.6 }),
+            has_gate: true,
             ..MainEnd::default()
         };
         let main = phases("balance", &rows, Some(&end)).main.unwrap();
@@ -310,6 +314,9 @@ mod tests {
         let gate = Gate::Steps { gate_episode: Some(4), tau_steps: Some(66.6) };
         assert_eq!(main.gate, Some(gate), "10 + 20 + 30 = 60 steps come before");
         assert_eq!((main.final_share, main.regions), (0.5, Vec::new()));
+        let end = MainEnd { has_gate: false, ..end };
+        let gate = Gate::Steps { gate_episode: None, tau_steps: Some(66.6) };
+        assert_eq!(phases("balance", &rows, Some(&end)).main.unwrap().gate, Some(gate));
     }
 
     #[test]

@@ -126,6 +126,7 @@ pub(super) fn conclude(
     let main = taught.then(|| MainEnd {
         regions: regions(profile, &sharing),
         gate: sharing.gate(0),
+        has_gate: profile.sharing.gate > 0.0,
         by_episode: profile.sharing.window_episodes.is_some(),
         learned,
         refused,

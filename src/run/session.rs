@@ -151,6 +151,7 @@ impl Session {
         let fresh = fresh_learner(&profile)?;
 
         let cut_off = cut_off_notice(order, &profile);
+        let unpractised = unpractised_notice(&profile, &plan);
         let created = Folder::create(
             &order.logs,
             &order.subject,
@@ -201,7 +202,7 @@ impl Session {
         })?;
         let learner = policy.map_or_else(|| fresh.clone(), |policy| policy.learner);
         let parts = Parts { profile, sidecar, folder, plan, fresh, hand, recorder };
-        let notices = created.notice.into_iter().chain(cut_off).collect();
+        let notices = created.notice.into_iter().chain(cut_off).chain(unpractised).collect();
         Ok(parts.assemble(learner, None, Vec::new(), company, notices))
     }
 
@@ -364,6 +365,14 @@ impl Parts {
         let frames = Arc::default();
         Session { cycle, profile, sidecar, folder, keys, frames, watcher, notices }
     }
+}
+
+/// That success should go by the person's practice, but there is none.
+fn unpractised_notice(profile: &Profile, plan: &Plan) -> Option<String> {
+    let main = plan.phase(Phase::Main)?;
+    let is_practised = plan.phase(Phase::Introduction).is_some();
+    let own = profile.experiment.task(profile.tick()).own_scale(None).filter(|_| !is_practised)?;
+    Some(format!("{}: {}", main.phase, own.why))
 }
 
 pub(super) fn usage(error: &dyn std::fmt::Display) -> RunError {

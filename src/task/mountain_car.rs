@@ -47,10 +47,16 @@ impl Default for Params {
 impl Check for Params {
     fn check(&self, c: &mut Checker<'_>) {
         c.count("cap_steps", self.cap_steps, 1..=1_000_000);
-        c.range("start_x", self.start_x, -2.0..=0.5);
+        c.range("start_x", self.start_x, -10.0..=10.0);
         c.range("start_spread", self.start_spread, 0.0..=1.0);
         c.range("step_reward", self.step_reward, -1000.0..=1000.0);
         c.range("goal_reward", self.goal_reward, -1e6..=1e6);
+        c.demand(
+            self.goal_reward > self.step_reward,
+            "goal_reward",
+            self.goal_reward,
+            "above step_reward, or the flag would be nothing to reach for",
+        );
         c.range("reward_min", self.reward_min, -1000.0..=1000.0);
         c.range("reward_threshold", self.reward_threshold, -1000.0..=1000.0);
         c.demand(

@@ -84,8 +84,9 @@ impl Check for Params {
         c.range("top_slow_deg", self.top_slow_deg, 1.0..=90.0);
         c.range("top_fast_deg", self.top_fast_deg, 1.0..=90.0);
         let widest = self.top_slow_deg.max(self.top_fast_deg);
+        let has_middle = widest < self.down_deg;
         c.demand(
-            widest < self.down_deg,
+            has_middle,
             "down_deg",
             self.down_deg,
             "above top_slow_deg and top_fast_deg, or there would be no middle",
@@ -102,7 +103,8 @@ impl Check for Params {
         for ((key, goal), lowest) in self.goals().into_iter().zip(lowest) {
             c.range(key, goal, 0.0..=179.0);
             c.demand(
-                goal < lowest,
+                // Where there is no middle that is the fault, not its goals.
+                goal < lowest || !has_middle,
                 key,
                 goal,
                 "an angle above the region's lowest one, where success is 0",
