@@ -57,6 +57,9 @@ pub trait Task: Send + Sync {
     /// better. Outcome weighting goes by its change.
     fn cost(&self, state: &State) -> f64;
 
+    /// The most control steps that a rollout for `occasion` lasts.
+    fn longest(&self, occasion: Occasion) -> u32;
+
     /// Whether a rollout that is in `state` after `steps` control steps is over.
     fn end(&self, state: &State, steps: u32, occasion: Occasion) -> Option<End>;
 

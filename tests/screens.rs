@@ -50,7 +50,8 @@ fn info() -> Info {
         gate: 0.4,
         gate_is_timer: true,
         by_episode: false,
-        cap_steps: None,
+        longest_taught: 1000,
+        longest_tested: 1000,
         action_limit: 10.0,
         action_unit: "N".to_owned(),
         scene: Scene::CartPole(Geometry {
@@ -159,7 +160,7 @@ fn the_car_in_its_valley() {
     let (mut info, mut snapshot) = (info(), running(Phase::Main));
     info.task = "mountain-car".to_owned();
     info.by_episode = true;
-    info.cap_steps = Some(500);
+    (info.longest_taught, info.longest_tested) = (500, 500);
     info.gate = 0.5;
     info.action_limit = 1.0;
     info.action_unit = String::new();

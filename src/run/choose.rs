@@ -86,11 +86,11 @@ pub(super) fn cut_off_notice(order: &Order, profile: &Profile) -> Option<String>
         .into_iter()
         .find(|cut| cut.subject == order.subject && cut.task == profile.experiment.name())?;
     Some(format!(
-        "trial {} was cut at {} {}; to go on with it: coadapt run --resume {}",
+        "coadapt run --resume {} goes on with trial {}, cut at {} {}",
+        cut.path.display(),
         cut.trial,
         cut.phase,
-        cut.episode,
-        cut.path.display()
+        cut.episode
     ))
 }
 

@@ -16,11 +16,12 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use crate::cli;
 use crate::clock::WallClock;
 use crate::operator::terminal::{self, Hands};
-use crate::profile::{self, Document, Experiment, Order, ProfileError};
+use crate::profile::{self, Document, Order, ProfileError};
 use crate::record::folder;
 use crate::session::Phase;
 use crate::session::plan::Plan;
 use crate::sharing::{self, Mode};
+use crate::task::Occasion;
 use crate::task::balance::Balance;
 use crate::tui::app::{self, Conductor, End, Running, Start};
 use crate::tui::live::Info;
@@ -276,10 +277,8 @@ fn info(session: &Session) -> Info {
         gate_is_timer: profile.sharing == sharing::Params::default()
             && profile.experiment.name() == Balance::NAME,
         by_episode: profile.sharing.window_episodes.is_some(),
-        cap_steps: match &profile.experiment {
-            Experiment::MountainCar { rules, .. } => Some(rules.cap_steps),
-            _ => None,
-        },
+        longest_taught: task.longest(Occasion::Taught),
+        longest_tested: task.longest(Occasion::Tested),
         action_limit: task.action_limit(),
         action_unit: profile.experiment.action_unit().to_owned(),
         scene: Scene::of(&profile.experiment),

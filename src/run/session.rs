@@ -202,7 +202,7 @@ impl Session {
         })?;
         let learner = policy.map_or_else(|| fresh.clone(), |policy| policy.learner);
         let parts = Parts { profile, sidecar, folder, plan, fresh, hand, recorder };
-        let notices = created.notice.into_iter().chain(cut_off).chain(unpractised).collect();
+        let notices = cut_off.into_iter().chain(created.notice).chain(unpractised).collect();
         Ok(parts.assemble(learner, None, Vec::new(), company, notices))
     }
 

@@ -129,6 +129,10 @@ impl Task for Balance {
         angle(state).powi(2) + speed.powi(2) / self.omega_squared.max(1e-9)
     }
 
+    fn longest(&self, _occasion: Occasion) -> u32 {
+        self.cap_steps
+    }
+
     fn end(&self, state: &State, steps: u32, _occasion: Occasion) -> Option<End> {
         // Written so that an angle that is not a number has failed, too.
         let upright = angle(state).abs() <= self.fail;

@@ -162,6 +162,10 @@ impl Task for MountainCar {
         1.0 - height - speed * speed / (2.0 * self.plant.gravity / 3.0).max(1e-12)
     }
 
+    fn longest(&self, _occasion: Occasion) -> u32 {
+        self.rules.cap_steps
+    }
+
     fn end(&self, state: &State, steps: u32, _occasion: Occasion) -> Option<End> {
         if !state.is_finite() {
             Some(End::Failed)

@@ -297,11 +297,15 @@ impl Task for SwingUp {
         energy.abs() + nearness * (falls - energy.abs())
     }
 
-    fn end(&self, state: &State, steps: u32, occasion: Occasion) -> Option<End> {
-        let all = match occasion {
+    fn longest(&self, occasion: Occasion) -> u32 {
+        match occasion {
             Occasion::Taught => self.rollout_steps,
             Occasion::Tested => self.test_steps,
-        };
+        }
+    }
+
+    fn end(&self, state: &State, steps: u32, occasion: Occasion) -> Option<End> {
+        let all = self.longest(occasion);
         if state.is_finite() { (steps >= all).then_some(End::Cap) } else { Some(End::Failed) }
     }
 

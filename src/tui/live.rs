@@ -56,8 +56,10 @@ pub struct Info {
     pub gate_is_timer: bool,
     /// Whether shares move once an episode.
     pub by_episode: bool,
-    /// The steps after which a rollout is given up; `None` where that is not what is counted.
-    pub cap_steps: Option<u32>,
+    /// The most steps that a steered rollout lasts,
+    pub longest_taught: u32,
+    /// and one that nobody steers.
+    pub longest_tested: u32,
     /// The largest action.
     pub action_limit: f64,
     /// The action's unit, one or two characters.
@@ -155,6 +157,13 @@ pub struct View<'a> {
 }
 
 impl View<'_> {
+    /// The most steps that a rollout of the present phase lasts.
+    #[must_use]
+    pub fn longest(&self) -> u32 {
+        let Info { longest_taught, longest_tested, .. } = *self.info;
+        if self.phase().is_steered() { longest_taught } else { longest_tested }
+    }
+
     /// The phase that the session is at; the plan's last once it is finished.
     #[must_use]
     pub fn phase(&self) -> Phase {

@@ -12,7 +12,7 @@ use ratatui::Frame;
 use super::keys::Screen;
 use super::palette::{Look, Role};
 use super::pen::{Pen, columns};
-use super::text::{cut, fixed, mean, real};
+use super::text::{cut, fixed, mean, real, wrapped};
 use super::{help, live, small};
 use crate::record::EpisodeRow;
 use crate::report::achieved::{Yardstick, yardstick};
@@ -91,6 +91,9 @@ pub struct State {
     /// Glyphs and colours.
     pub look: Look,
 }
+
+/// A sentence of the summary begins here, after its phase.
+const SENTENCE: u16 = 14;
 
 /// How many pages there are.
 const PAGES: usize = 4;
@@ -232,11 +235,29 @@ fn write(pen: &mut Pen<'_>, lines: &[String]) {
     }
 }
 
+/// A sentence of the summary in lines of at most `width`, the later ones moved in.
+fn sentence(line: &str, width: usize) -> Vec<(String, Role)> {
+    let line = line.replace(" -", " −");
+    if line.chars().count() <= width {
+        return vec![(line, Role::Text)];
+    }
+    // The phase's name and its blanks stay as they are.
+    let (phase, words) = line.split_at(line.find("  ").unwrap_or(0));
+    let lines = wrapped(words, width.saturating_sub(SENTENCE.into()));
+    let begins = std::iter::once(phase).chain(std::iter::repeat(""));
+    begins
+        .zip(lines)
+        .map(|(begin, words)| {
+            (format!("{begin:<width$}{words}", width = SENTENCE.into()), Role::Text)
+        })
+        .collect()
+}
+
 /// Summary and files, as many as there is room for.
 fn files(pen: &mut Pen<'_>, info: &Info) {
     let width = usize::from(pen.width().saturating_sub(2));
     let mut lines: Vec<(String, Role)> =
-        info.summary.iter().map(|line| (cut(line, width), Role::Text)).collect();
+        info.summary.iter().flat_map(|line| sentence(line, width)).collect();
     if !lines.is_empty() {
         lines.push((String::new(), Role::Text));
     }

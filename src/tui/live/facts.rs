@@ -77,8 +77,8 @@ fn mountain_car(pen: &mut Pen<'_>, view: &View<'_>) {
         .map(|row| f64::from(row.steps))
         .collect();
     let best = reached.iter().copied().fold(f64::NAN, f64::min);
-    let of = view.info.cap_steps.map_or_else(String::new, |cap| format!("/{cap}"));
-    left(pen, 0, "step", &format!("{}{of}", count(step.into(), 3)), Role::Strong);
+    let of = view.longest();
+    left(pen, 0, "step", &format!("{}/{of}", count(step.into(), 3)), Role::Strong);
     right(pen, 0, "best", &fixed(best, 5, 0));
     last_ten(pen, &steps, 1.0, 0);
     left(pen, 2, "flags", &format!("{}/{}", reached.len(), steps.len()), Role::Text);

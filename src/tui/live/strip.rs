@@ -70,7 +70,10 @@ fn progress(view: &View<'_>, plan: &PhasePlan) -> (f64, String) {
     let steps = moment.steps_before.saturating_add(u64::from(moment.step));
     if let Some(all) = plan.rollouts {
         let width = all.to_string().len();
-        let part = f64::from(moment.rollout.saturating_sub(1)) / f64::from(all.max(1));
+        // The rollout under way counts as far as it came: a single long one, too, gets on.
+        let under_way = f64::from(moment.step) / f64::from(view.longest().max(1));
+        let before = f64::from(moment.rollout.saturating_sub(1));
+        let part = (before + under_way) / f64::from(all.max(1));
         return (part, format!("{:>width$}/{all}", moment.rollout));
     }
     let seconds =
