@@ -1,23 +1,24 @@
 //! `coadapt evaluate`: policies alone over many starts, beside nobody on the same ones.
 
+mod trial;
+
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use serde::Serialize;
 
 use super::shutdown::Shutdown;
-use super::words::{document, read, usage};
 use super::{RunError, say, signal_code, tell};
 use crate::cli;
-use crate::learner::{Learner, Model};
-use crate::profile::{Document, Profile};
-use crate::record::{self, EpisodeRow, Policy, policy};
+use crate::learner::Model;
+use crate::profile::Profile;
+use crate::record::EpisodeRow;
 use crate::report::achieved::{Yardstick, yardstick};
 use crate::report::metrics::{self, Measures};
 use crate::report::spread::{interval95, median};
 use crate::session::Phase;
 use crate::study::evaluate as evaluation;
+use trial::Trial;
 
 /// What `evaluate --json` prints.
 #[derive(Serialize)]
@@ -62,15 +63,6 @@ struct Tenth {
     improvement_percent: Option<f64>,
 }
 
-/// A policy and the rules that it is tried by.
-struct Trial {
-    file: PathBuf,
-    folder: Option<PathBuf>,
-    policy: Policy<Model>,
-    profile: Profile,
-    shown: String,
-}
-
 pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
     let trial = Trial::of(words)?;
     let shutdown = Shutdown::listen();
@@ -84,7 +76,11 @@ pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
     };
     let task = profile.experiment.name();
     let mut tenths: Vec<Tenth> = Vec::new();
-    for (percent, learner) in trial.tenths() {
+    let held = trial.tenths();
+    for notice in &held.notices {
+        tell(notice);
+    }
+    for (percent, learner) in held.learners {
         let tried = evaluation::autonomous(profile, &learner, words.seed, interrupted);
         let Some(rows) = tried else {
             return Ok(signal_code(shutdown.signal().unwrap_or_default()));
@@ -137,69 +133,6 @@ fn rollouts(profile: &Profile, rows: &[EpisodeRow]) -> Vec<serde_json::Value> {
             Some(rollout)
         })
         .collect()
-}
-
-impl Trial {
-    /// The policy that `words` name, and the profile: the given one, that of its session, or
-    /// the shipped one of its task and preset.
-    fn of(words: &cli::Evaluate) -> Result<Self, RunError> {
-        let is_session = words.policy.is_dir();
-        let file = if is_session { words.policy.join("policy.json") } else { words.policy.clone() };
-        let policy: Policy<Model> = record::read_policy(&file).map_err(usage)?;
-        let folder = file.parent().unwrap_or(Path::new("")).to_owned();
-        let sidecar = folder.join("session.json");
-        let mut document = match &words.profile {
-            Some(name) => document(name, &[])?,
-            None if is_session || sidecar.is_file() => {
-                let sidecar = record::read_sidecar(&sidecar).map_err(usage)?;
-                Document::from_text("session.json", sidecar.profile_ron)
-            }
-            None if policy.task == record::policy::TABLE => {
-                return Err(usage(format_args!(
-                    "{} was learned from a table, so no task is known: give --profile",
-                    file.display()
-                )));
-            }
-            None => {
-                let own = format!("{}-{}", policy.task, policy.preset);
-                let document = document(&own, &[]).or_else(|_| document(&policy.task, &[]))?;
-                tell(&format!("{}: the rules are those of {}", file.display(), document.shown()));
-                document
-            }
-        };
-        if let Some(starts) = words.starts {
-            document.set("session.autonomous_rollouts", &starts.to_string());
-        }
-        if words.random {
-            document.set("session.starts", "random");
-        }
-        for (key, value) in &words.set {
-            document.set(key, value);
-        }
-        let shown = document.shown().to_owned();
-        let profile = read(&document)?;
-        let features = profile.experiment.task(profile.tick()).feature_names();
-        let columns = (policy.learner.inputs(), policy.learner.outputs());
-        if let Some(misfit) = policy.misfit(profile.experiment.name(), features, columns) {
-            return Err(usage(format_args!(
-                "{}: {misfit}; give the profile that it was taught with: --profile, or --set",
-                file.display()
-            )));
-        }
-        let folder = is_session.then_some(folder);
-        Ok(Self { file, folder, policy, profile, shown })
-    }
-
-    /// The policies after the tenths of main, where a session holds them.
-    fn tenths(&self) -> Vec<(u8, Model)> {
-        let Some(folder) = &self.folder else { return Vec::new() };
-        (1..=10)
-            .filter_map(|tenth| {
-                let file = folder.join(policy::file_name(Some(tenth * 10)));
-                Some((tenth * 10, record::read_policy::<Model>(&file).ok()?.learner))
-            })
-            .collect()
-    }
 }
 
 impl Alone {
