@@ -8,8 +8,12 @@ mod desk;
 
 use std::fs;
 use std::path::PathBuf;
+use std::process::{Command, Stdio};
 
+use coadapt::clock::{Clock, WallClock};
+use coadapt::signal::Seconds;
 use desk::{Desk, names, text};
+use serde_json::Value;
 
 /// A small session of `profile` in the folder `s`, quick to teach and to evaluate.
 fn taught(profile: &str) -> (Desk, PathBuf) {
@@ -150,5 +154,109 @@ fn a_tenth_that_cannot_be_tried_is_named_with_its_reason() {
     }
     for percent in [30, 50, 60, 100] {
         assert!(!printed.contains(&format!("{percent} %  ")), "{printed}");
+    }
+}
+
+fn evaluated(desk: &Desk, words: &str) -> Value {
+    serde_json::from_str(&desk.succeed(&format!("evaluate {words} --json"))).unwrap()
+}
+
+/// The first line that people are shown.
+fn first_line(desk: &Desk, words: &str) -> String {
+    desk.succeed(&format!("evaluate {words}")).lines().next().unwrap().to_owned()
+}
+
+#[test]
+fn the_rules_that_were_used_are_named() {
+    let (desk, folder) = taught("balance-modern");
+    assert_eq!(evaluated(&desk, "s")["profile"], "s/session.json");
+    assert_eq!(evaluated(&desk, "s/policy-010.json")["profile"], "s/session.json");
+    let line = first_line(&desk, "s");
+    assert_eq!(
+        line,
+        "s/policy.json by the rules of s/session.json: balance, 3 grid starts, seed 1"
+    );
+    let longer = "s --starts 1 --random --seed 4 --set plant.pole_length_m=0.7";
+    says(&first_line(&desk, longer), &["1 random start, seed 4, plant.pole_length_m=0.7"]);
+    assert_eq!(evaluated(&desk, longer)["set"][0], "plant.pole_length_m=0.7");
+
+    // Away from its session a policy brings its preset's rules.
+    fs::copy(folder.join("policy.json"), desk.at("p.json")).unwrap();
+    assert_eq!(evaluated(&desk, "p.json")["profile"], "balance-modern.ron (built in)");
+    says(&first_line(&desk, "p.json"), &["p.json by the rules of balance-modern.ron (built in)"]);
+    // Of an unknown preset it brings the task's.
+    let own = fs::read_to_string(desk.at("p.json")).unwrap().replace("\"modern\"", "\"own\"");
+    fs::write(desk.at("p.json"), own).unwrap();
+    assert_eq!(evaluated(&desk, "p.json")["profile"], "balance.ron (built in)");
+}
+
+#[test]
+fn random_starts_go_by_the_seed() {
+    let (desk, _) = taught("balance");
+    let starts = |words: &str| -> Vec<f64> {
+        let json = evaluated(&desk, words);
+        let rollouts = json["rollouts"].as_array().unwrap();
+        rollouts.iter().map(|rollout| rollout["start"].as_f64().unwrap()).collect()
+    };
+    let random = starts("s --random --starts 4 --seed 3");
+    assert_eq!(random, starts("s --random --starts 4 --seed 3"));
+    assert_ne!(random, starts("s --random --starts 4 --seed 4"));
+    let grid = starts("s --starts 4");
+    assert_ne!(random, grid);
+    assert!(grid.is_sorted() && !random.is_sorted(), "{random:?}");
+}
+
+/// Mean, median and interval of the yardstick, which for swing-up is a height: it may be
+/// negative, so nothing is better by so many percent.
+#[test]
+fn all_that_act_alone_have_mean_median_and_interval() {
+    for (task, yardstick) in [("balance", "mean_balance_s"), ("swing-up", "mean_height")] {
+        let (desk, _) = taught(&format!("{task} --set session.main_duration_s=None"));
+        let json = evaluated(&desk, "s");
+        let tenths = json["tenths"].as_array().unwrap();
+        assert_eq!(tenths.len(), 10);
+        for alone in tenths.iter().chain([&json, &json["zero_control"]]) {
+            let number = |value: &Value| value.as_f64().unwrap();
+            let mean = number(&alone["mean"]);
+            assert!((mean - number(&alone[yardstick])).abs() < 1e-9, "{task}: {alone}");
+            let (low, high) = (number(&alone["interval95"][0]), number(&alone["interval95"][1]));
+            assert!(low <= mean + 1e-9 && mean <= high + 1e-9 && alone["median"].is_number());
+        }
+        for tenth in tenths {
+            let improvement = &tenth["improvement_percent"];
+            assert_eq!(improvement.is_null(), task == "swing-up", "{improvement}");
+        }
+        let printed = desk.succeed("evaluate s");
+        assert_eq!(printed.contains("% on the first"), task == "balance", "{printed}");
+    }
+}
+
+#[test]
+fn a_signal_is_answered_with_what_was_done() {
+    let (desk, _) = taught("balance");
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        // So many starts take minutes.
+        let child = Command::new(env!("CARGO_BIN_EXE_coadapt"))
+            .current_dir(desk.at(""))
+            .args("evaluate s --starts 1000000 --json".split(' '))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let listens = || {
+            let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+            let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
+            u64::from_str_radix(caught.trim(), 16).unwrap() & (1 << 14) != 0
+        };
+        let mut clock = WallClock::start();
+        while !listens() {
+            assert!(clock.now() < Seconds(60.0), "it does not listen to signals");
+            clock.wait_until(clock.now() + Seconds(0.005));
+        }
+        let kill = format!("-{signal}");
+        Command::new("kill").args([&kill, &child.id().to_string()]).status().unwrap();
+        let output = child.wait_with_output().unwrap();
+        assert_eq!((output.status.code(), text(&output.stdout)), (Some(code), String::new()));
+        assert_eq!(text(&output.stderr), "coadapt: interrupted: nothing was evaluated\n");
     }
 }

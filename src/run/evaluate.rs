@@ -10,7 +10,6 @@ use serde::Serialize;
 use super::shutdown::Shutdown;
 use super::{RunError, say, signal_code, tell};
 use crate::cli;
-use crate::learner::Model;
 use crate::profile::Profile;
 use crate::record::EpisodeRow;
 use crate::report::achieved::{Yardstick, yardstick};
@@ -24,8 +23,13 @@ use trial::Trial;
 #[derive(Serialize)]
 struct Evaluation {
     schema: u32,
+    /// The file of the policy,
     policy: String,
+    /// and of the rules: a profile, or the `session.json` of the policy's session,
     profile: String,
+    /// with these changes, as given by `--set`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    set: Vec<String>,
     task: String,
     preset: String,
     seed: u64,
@@ -46,9 +50,11 @@ struct Evaluation {
 struct Alone {
     #[serde(flatten)]
     measures: Measures,
-    /// The median of the task's yardstick over the rollouts,
+    /// The mean of the task's yardstick over the rollouts, each counting the same,
+    mean: Option<f64>,
+    /// the median,
     median: Option<f64>,
-    /// and the 95 % interval of its mean (percentile bootstrap over the rollouts).
+    /// and the 95 % interval of the mean (percentile bootstrap over the rollouts).
     interval95: Option<(f64, f64)>,
 }
 
@@ -64,47 +70,40 @@ struct Tenth {
 }
 
 pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
-    let trial = Trial::of(words)?;
     let shutdown = Shutdown::listen();
-    let interrupted = || shutdown.signal().is_some();
+    let trial = Trial::of(words)?;
+    let is_enough = || shutdown.signal().is_some();
     let profile = &trial.profile;
-    let try_out = |learner: &Model| {
-        evaluation::autonomous_and_nobody(profile, learner, words.seed, interrupted)
+    let learner = &trial.policy.learner;
+    let tried = evaluation::autonomous_and_nobody(profile, learner, words.seed, is_enough);
+    let Some(rows) = tried else {
+        return Ok(interrupted(&shutdown, "nothing was evaluated"));
     };
-    let Some(rows) = try_out(&trial.policy.learner) else {
-        return Ok(signal_code(shutdown.signal().unwrap_or_default()));
+    let tenths = match tenths(&trial, words.seed, is_enough) {
+        Ok(tenths) => tenths,
+        Err(done) => {
+            let what = format!(
+                "the policy, nobody and {done} of the tenths were evaluated; results are printed \
+                 whole or not at all, and sooner with fewer --starts"
+            );
+            return Ok(interrupted(&shutdown, &what));
+        }
     };
     let task = profile.experiment.name();
-    let mut tenths: Vec<Tenth> = Vec::new();
-    let held = trial.tenths();
-    for notice in &held.notices {
-        tell(notice);
-    }
-    for (percent, learner) in held.learners {
-        let tried = evaluation::autonomous(profile, &learner, words.seed, interrupted);
-        let Some(rows) = tried else {
-            return Ok(signal_code(shutdown.signal().unwrap_or_default()));
-        };
-        let Some(alone) = Alone::of(task, &rows, Phase::Autonomous) else { continue };
-        let first = tenths.first().map_or(&alone, |tenth| &tenth.alone).measures.achieved.mean();
-        let improvement_percent =
-            improvement(&yardstick(task), first, alone.measures.achieved.mean());
-        tenths.push(Tenth { percent, alone, improvement_percent });
-    }
     let alone = Alone::of(task, &rows, Phase::Autonomous);
     let nobody = Alone::of(task, &rows, Phase::ZeroControl);
     let (Some(alone), Some(zero_control)) = (alone, nobody) else {
         return Err(RunError::Failed("no rollout took place".to_owned()));
     };
-    let starts = format!("{:?}", profile.session.starts).to_lowercase();
     let evaluation = Evaluation {
         schema: 1,
         policy: trial.file.display().to_string(),
         profile: trial.shown.clone(),
+        set: words.set.iter().map(|(key, value)| format!("{key}={value}")).collect(),
         task: task.to_owned(),
         preset: trial.policy.preset.clone(),
         seed: words.seed,
-        starts,
+        starts: format!("{:?}", profile.session.starts).to_lowercase(),
         alone,
         zero_control,
         tenths,
@@ -117,6 +116,32 @@ pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
         say(&evaluation.sentences().join("\n"))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What the tenths' policies come to on the same starts; only how many were tried, where
+/// that is enough.
+fn tenths(trial: &Trial, seed: u64, is_enough: impl Fn() -> bool) -> Result<Vec<Tenth>, usize> {
+    let task = trial.profile.experiment.name();
+    let held = trial.tenths();
+    for notice in &held.notices {
+        tell(notice);
+    }
+    let mut tenths: Vec<Tenth> = Vec::new();
+    for (percent, learner) in held.learners {
+        let tried = evaluation::autonomous(&trial.profile, &learner, seed, &is_enough);
+        let rows = tried.ok_or(tenths.len())?;
+        let Some(alone) = Alone::of(task, &rows, Phase::Autonomous) else { continue };
+        let first = tenths.first().map_or(&alone, |tenth| &tenth.alone).measures.achieved.mean();
+        let improvement_percent =
+            improvement(&yardstick(task), first, alone.measures.achieved.mean());
+        tenths.push(Tenth { percent, alone, improvement_percent });
+    }
+    Ok(tenths)
+}
+
+fn interrupted(shutdown: &Shutdown, what: &str) -> ExitCode {
+    tell(&format!("interrupted: {what}"));
+    shutdown.signal().map_or(ExitCode::FAILURE, signal_code)
 }
 
 /// The robot's rollouts, the task's own measures by their names.
@@ -143,7 +168,12 @@ impl Alone {
             _ => phases.autonomous,
         }?;
         let values: Vec<f64> = metrics::rollouts_of(rows, phase).map(yardstick(task).of).collect();
-        Some(Self { measures, median: median(&values), interval95: interval95(&values) })
+        Some(Self {
+            measures,
+            mean: (!values.is_empty()).then(|| metrics::mean(&values)),
+            median: median(&values),
+            interval95: interval95(&values),
+        })
     }
 
     /// In a sentence.
@@ -165,7 +195,18 @@ impl Evaluation {
     fn sentences(&self) -> Vec<String> {
         let yardstick = yardstick(&self.task);
         let Yardstick { name, unit, decimals, .. } = yardstick;
+        let Self { policy, profile, task, starts, seed, .. } = self;
+        let episodes = self.alone.measures.episodes;
+        let s = if episodes == 1 { "" } else { "s" };
+        let mut given = format!(
+            "{policy} by the rules of {profile}: {task}, {episodes} {starts} start{s}, seed {seed}"
+        );
+        if !self.set.is_empty() {
+            // Writing to a text cannot fail.
+            let _ = write!(given, ", {}", self.set.join(", "));
+        }
         let mut lines = vec![
+            given,
             format!("robot alone  {}", self.alone.sentence(&yardstick)),
             format!("nobody       {}", self.zero_control.sentence(&yardstick)),
         ];
