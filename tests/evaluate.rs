@@ -72,6 +72,12 @@ fn a_cut_session_is_told_how_to_go_on() {
     let message = refusal(&desk, "evaluate s");
     says(&message, &["coadapt run --resume s"]);
     assert!(!message.contains("policy-0"), "{message}");
+    let recorder = fs::File::open(folder.join("steps.csv")).unwrap();
+    recorder.lock().unwrap();
+    let message = refusal(&desk, "evaluate s");
+    says(&message, &["still being recorded", "let it end first"]);
+    assert!(!message.contains("--resume"), "{message}");
+    drop(recorder);
     fs::remove_file(folder.join("session.json")).unwrap();
     says(&refusal(&desk, "evaluate s"), &["s is not the folder of a session", "session.json"]);
 
