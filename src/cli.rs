@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, value_parser};
 
 use crate::profile::Order;
 use crate::session::BadSubject;
+use crate::session::plan::MOST_ROLLOUTS;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -113,7 +114,8 @@ pub struct Evaluate {
     #[arg(long, value_name = "PROFILE")]
     pub profile: Option<String>,
     /// The number of starts [default: the profile's].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true,
+        value_parser = value_parser!(u32).range(1..=i64::from(MOST_ROLLOUTS)))]
     pub starts: Option<u32>,
     /// Starts drawn at random in place of the profile's.
     #[arg(long)]

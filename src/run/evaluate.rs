@@ -1,30 +1,35 @@
 //! `coadapt evaluate`: policies alone over many starts, beside nobody on the same ones.
 
+mod trial;
+
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use serde::Serialize;
 
 use super::shutdown::Shutdown;
-use super::words::{document, read, usage};
 use super::{RunError, say, signal_code, tell};
 use crate::cli;
-use crate::learner::{Learner, Model};
-use crate::profile::{Document, Profile};
-use crate::record::{self, EpisodeRow, Policy, policy};
+use crate::profile::Profile;
+use crate::record::EpisodeRow;
 use crate::report::achieved::{Yardstick, yardstick};
 use crate::report::metrics::{self, Measures};
 use crate::report::spread::{interval95, median};
 use crate::session::Phase;
 use crate::study::evaluate as evaluation;
+use trial::Trial;
 
 /// What `evaluate --json` prints.
 #[derive(Serialize)]
 struct Evaluation {
     schema: u32,
+    /// The file of the policy,
     policy: String,
+    /// and of the rules: a profile, or the `session.json` of the policy's session,
     profile: String,
+    /// with these changes, as given by `--set`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    set: Vec<String>,
     task: String,
     preset: String,
     seed: u64,
@@ -45,9 +50,11 @@ struct Evaluation {
 struct Alone {
     #[serde(flatten)]
     measures: Measures,
-    /// The median of the task's yardstick over the rollouts,
+    /// The mean of the task's yardstick over the rollouts, each counting the same,
+    mean: Option<f64>,
+    /// the median,
     median: Option<f64>,
-    /// and the 95 % interval of its mean (percentile bootstrap over the rollouts).
+    /// and the 95 % interval of the mean (percentile bootstrap over the rollouts).
     interval95: Option<(f64, f64)>,
 }
 
@@ -62,55 +69,41 @@ struct Tenth {
     improvement_percent: Option<f64>,
 }
 
-/// A policy and the rules that it is tried by.
-struct Trial {
-    file: PathBuf,
-    folder: Option<PathBuf>,
-    policy: Policy<Model>,
-    profile: Profile,
-    shown: String,
-}
-
 pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
-    let trial = Trial::of(words)?;
     let shutdown = Shutdown::listen();
-    let interrupted = || shutdown.signal().is_some();
+    let trial = Trial::of(words)?;
+    let is_enough = || shutdown.signal().is_some();
     let profile = &trial.profile;
-    let try_out = |learner: &Model| {
-        evaluation::autonomous_and_nobody(profile, learner, words.seed, interrupted)
+    let learner = &trial.policy.learner;
+    let tried = evaluation::autonomous_and_nobody(profile, learner, words.seed, is_enough);
+    let Some(rows) = tried else {
+        return Ok(interrupted(&shutdown, "nothing was evaluated"));
     };
-    let Some(rows) = try_out(&trial.policy.learner) else {
-        return Ok(signal_code(shutdown.signal().unwrap_or_default()));
+    let tenths = match tenths(&trial, words.seed, is_enough) {
+        Ok(tenths) => tenths,
+        Err(done) => {
+            let what = format!(
+                "the policy, nobody and {done} of the tenths were evaluated; results are printed \
+                 whole or not at all, and sooner with fewer --starts"
+            );
+            return Ok(interrupted(&shutdown, &what));
+        }
     };
     let task = profile.experiment.name();
-    let mut tenths: Vec<Tenth> = Vec::new();
-    for (percent, learner) in trial.tenths() {
-        let tried = evaluation::autonomous(profile, &learner, words.seed, interrupted);
-        let Some(rows) = tried else {
-            return Ok(signal_code(shutdown.signal().unwrap_or_default()));
-        };
-        let Some(alone) = Alone::of(task, &rows, Phase::Autonomous) else { continue };
-        let mean = |alone: &Alone| alone.measures.achieved.mean();
-        let first = mean(tenths.first().map_or(&alone, |tenth| &tenth.alone));
-        let improvement_percent = first
-            .zip(mean(&alone))
-            .and_then(|(first, value)| improvement(&yardstick(task), first, value));
-        tenths.push(Tenth { percent, alone, improvement_percent });
-    }
     let alone = Alone::of(task, &rows, Phase::Autonomous);
     let nobody = Alone::of(task, &rows, Phase::ZeroControl);
     let (Some(alone), Some(zero_control)) = (alone, nobody) else {
         return Err(RunError::Failed("no rollout took place".to_owned()));
     };
-    let starts = format!("{:?}", profile.session.starts).to_lowercase();
     let evaluation = Evaluation {
         schema: 1,
         policy: trial.file.display().to_string(),
         profile: trial.shown.clone(),
+        set: words.set.iter().map(|(key, value)| format!("{key}={value}")).collect(),
         task: task.to_owned(),
         preset: trial.policy.preset.clone(),
         seed: words.seed,
-        starts,
+        starts: format!("{:?}", profile.session.starts).to_lowercase(),
         alone,
         zero_control,
         tenths,
@@ -123,6 +116,34 @@ pub(super) fn evaluate(words: &cli::Evaluate) -> Result<ExitCode, RunError> {
         say(&evaluation.sentences().join("\n"))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What the tenths' policies come to on the same starts; only how many were tried, where
+/// that is enough.
+fn tenths(trial: &Trial, seed: u64, is_enough: impl Fn() -> bool) -> Result<Vec<Tenth>, usize> {
+    let task = trial.profile.experiment.name();
+    let held = trial.tenths();
+    for notice in &held.notices {
+        tell(notice);
+    }
+    let mut tenths: Vec<Tenth> = Vec::new();
+    for (percent, learner) in held.learners {
+        let tried = evaluation::autonomous(&trial.profile, &learner, seed, &is_enough);
+        let rows = tried.ok_or(tenths.len())?;
+        let Some(alone) = Alone::of(task, &rows, Phase::Autonomous) else { continue };
+        let mean = |alone: &Alone| alone.measures.achieved.mean();
+        let first = mean(tenths.first().map_or(&alone, |tenth| &tenth.alone));
+        let improvement_percent = first
+            .zip(mean(&alone))
+            .and_then(|(first, value)| improvement(&yardstick(task), first, value));
+        tenths.push(Tenth { percent, alone, improvement_percent });
+    }
+    Ok(tenths)
+}
+
+fn interrupted(shutdown: &Shutdown, what: &str) -> ExitCode {
+    tell(&format!("interrupted: {what}"));
+    shutdown.signal().map_or(ExitCode::FAILURE, signal_code)
 }
 
 /// The robot's rollouts, the task's own measures by their names.
@@ -141,69 +162,6 @@ fn rollouts(profile: &Profile, rows: &[EpisodeRow]) -> Vec<serde_json::Value> {
         .collect()
 }
 
-impl Trial {
-    /// The policy that `words` name, and the profile: the given one, that of its session, or
-    /// the shipped one of its task and preset.
-    fn of(words: &cli::Evaluate) -> Result<Self, RunError> {
-        let is_session = words.policy.is_dir();
-        let file = if is_session { words.policy.join("policy.json") } else { words.policy.clone() };
-        let policy: Policy<Model> = record::read_policy(&file).map_err(usage)?;
-        let folder = file.parent().unwrap_or(Path::new("")).to_owned();
-        let sidecar = folder.join("session.json");
-        let mut document = match &words.profile {
-            Some(name) => document(name, &[])?,
-            None if is_session || sidecar.is_file() => {
-                let sidecar = record::read_sidecar(&sidecar).map_err(usage)?;
-                Document::from_text("session.json", sidecar.profile_ron)
-            }
-            None if policy.task == record::policy::TABLE => {
-                return Err(usage(format_args!(
-                    "{} was learned from a table, so no task is known: give --profile",
-                    file.display()
-                )));
-            }
-            None => {
-                let own = format!("{}-{}", policy.task, policy.preset);
-                let document = document(&own, &[]).or_else(|_| document(&policy.task, &[]))?;
-                tell(&format!("{}: the rules are those of {}", file.display(), document.shown()));
-                document
-            }
-        };
-        if let Some(starts) = words.starts {
-            document.set("session.autonomous_rollouts", &starts.to_string());
-        }
-        if words.random {
-            document.set("session.starts", "random");
-        }
-        for (key, value) in &words.set {
-            document.set(key, value);
-        }
-        let shown = document.shown().to_owned();
-        let profile = read(&document)?;
-        let features = profile.experiment.task(profile.tick()).feature_names();
-        let columns = (policy.learner.inputs(), policy.learner.outputs());
-        if let Some(misfit) = policy.misfit(profile.experiment.name(), features, columns) {
-            return Err(usage(format_args!(
-                "{}: {misfit}; give the profile that it was taught with: --profile, or --set",
-                file.display()
-            )));
-        }
-        let folder = is_session.then_some(folder);
-        Ok(Self { file, folder, policy, profile, shown })
-    }
-
-    /// The policies after the tenths of main, where a session holds them.
-    fn tenths(&self) -> Vec<(u8, Model)> {
-        let Some(folder) = &self.folder else { return Vec::new() };
-        (1..=10)
-            .filter_map(|tenth| {
-                let file = folder.join(policy::file_name(Some(tenth * 10)));
-                Some((tenth * 10, record::read_policy::<Model>(&file).ok()?.learner))
-            })
-            .collect()
-    }
-}
-
 impl Alone {
     fn of(task: &str, rows: &[EpisodeRow], phase: Phase) -> Option<Self> {
         let phases = metrics::phases(task, rows, None);
@@ -213,7 +171,12 @@ impl Alone {
         }?;
         let values: Vec<f64> =
             metrics::rollouts_of(rows, phase).filter_map(yardstick(task).of).collect();
-        Some(Self { measures, median: median(&values), interval95: interval95(&values) })
+        Some(Self {
+            measures,
+            mean: (!values.is_empty()).then(|| metrics::mean(&values)),
+            median: median(&values),
+            interval95: interval95(&values),
+        })
     }
 
     /// In a sentence.
@@ -235,7 +198,18 @@ impl Evaluation {
     fn sentences(&self) -> Vec<String> {
         let yardstick = yardstick(&self.task);
         let Yardstick { name, unit, decimals, .. } = yardstick;
+        let Self { policy, profile, task, starts, seed, .. } = self;
+        let episodes = self.alone.measures.episodes;
+        let s = if episodes == 1 { "" } else { "s" };
+        let mut given = format!(
+            "{policy} by the rules of {profile}: {task}, {episodes} {starts} start{s}, seed {seed}"
+        );
+        if !self.set.is_empty() {
+            // Writing to a text cannot fail.
+            let _ = write!(given, ", {}", self.set.join(", "));
+        }
         let mut lines = vec![
+            given,
             format!("robot alone  {}", self.alone.sentence(&yardstick)),
             format!("nobody       {}", self.zero_control.sentence(&yardstick)),
         ];
