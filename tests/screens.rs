@@ -636,6 +636,23 @@ fn any_stage() -> impl Strategy<Value = Stage> {
     })
 }
 
+/// Found by chance below: a chart's scale overflowed.
+#[test]
+fn results_of_absurd_size_are_drawn() {
+    for size in [2.903_570_561_308_767e307, -1e308, f64::MAX, f64::NAN, f64::INFINITY] {
+        let mut info = results();
+        for row in &mut info.rollouts {
+            (row.duration_s, row.start) = (size, -size);
+        }
+        let mut state = results::State::default();
+        for _page in 0..4 {
+            results_picture(80, 24, &info, &state);
+            results_picture(120, 40, &info, &state);
+            state.next();
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]

@@ -187,12 +187,19 @@ fn chart(pen: &mut Pen<'_>, curves: &[Curve], x: &Scale, y: &Scale) {
     }
     let rows = legend(pen, curves, &format!("{} by {}", y.title, x.title));
     let look = pen.look;
-    let data = curves.iter().filter(|curve| !curve.points.is_empty()).map(|curve| {
+    let drawn: Vec<(&Curve, Points)> = curves
+        .iter()
+        .filter(|curve| !curve.points.is_empty())
+        .map(|curve| {
+            (curve, curve.points.iter().map(|(x, y)| (drawable(*x), drawable(*y))).collect())
+        })
+        .collect();
+    let data = drawn.iter().map(|(curve, points)| {
         Dataset::default()
             .marker(curve.marker(look.glyphs))
             .graph_type(curve.graph)
             .style(look.palette.style(curve.role))
-            .data(&curve.points)
+            .data(points)
     });
     let dim = look.palette.style(Role::Dim);
     let mut part = pen.part(0, rows, width, height.saturating_sub(rows));
@@ -202,6 +209,12 @@ fn chart(pen: &mut Pen<'_>, curves: &[Curve], x: &Scale, y: &Scale) {
         .y_axis(axis(y, dim))
         .legend_position(None)
         .render(area, part.buffer());
+}
+
+/// The number nearest to `value` that can be scaled to a screen: the differences of larger
+/// ones overflow.
+const fn drawable(value: f64) -> f64 {
+    value.clamp(-1e100, 1e100)
 }
 
 /// What the chart shows, and what its marks mean; returns the rows that took. Narrow charts
@@ -225,10 +238,11 @@ fn legend(pen: &mut Pen<'_>, curves: &[Curve], title: &str) -> u16 {
 /// An axis with three labels; without the middle one where it would read like an end.
 fn axis(scale: &Scale, style: Style) -> Axis<'static> {
     // A single point still needs an axis with a length.
-    let to = if scale.to > scale.from { scale.to } else { scale.from + 1.0 };
-    let [first, middle, last] = [scale.from, f64::midpoint(scale.from, to), to]
+    let (from, to) = (drawable(scale.from), drawable(scale.to));
+    let to = if to > from { to } else { from + 1.0 };
+    let [first, middle, last] = [from, f64::midpoint(from, to), to]
         .map(|value| format!("{value:.*}", scale.decimals).replace('-', "−"));
     let middle = if middle == first || middle == last { String::new() } else { middle };
     let labels = [first, middle, last].map(Line::raw);
-    Axis::default().style(style).bounds([scale.from, to]).labels(labels)
+    Axis::default().style(style).bounds([from, to]).labels(labels)
 }
