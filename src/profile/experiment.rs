@@ -22,7 +22,6 @@ use crate::task::swing_up::{self, SwingUp};
 /// A task with the parameters of its plant and its rules.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-#[expect(clippy::large_enum_variant, reason = "one a profile, and seldom moved")]
 pub enum Experiment {
     /// Keep the pole up.
     Balance {
