@@ -51,6 +51,9 @@ pub trait Operator: Send {
     /// A rollout is about to begin, after that much practice.
     fn begin(&mut self, place: Place, practice: Practice);
 
+    /// From now on the device's deflection counts `sensitivity` times; nonsense is ignored.
+    fn tune(&mut self, _sensitivity: f64) {}
+
     /// The latest wish; never blocks. Called in the countdown too, where it has no effect.
     fn intent(&mut self, view: View<'_>) -> Intent;
 

@@ -78,6 +78,8 @@ pub struct StepRow<Name = &'static str> {
     pub region: Option<Name>,
     /// How late the tick began, µs; 0 on virtual time.
     pub lateness_us: u32,
+    /// The deflection of the operator's device, before it was shaped.
+    pub raw: Option<f64>,
 }
 
 impl<Name> StepRow<Name> {
@@ -99,6 +101,7 @@ impl<Name> StepRow<Name> {
             success: None,
             region: None,
             lateness_us: 0,
+            raw: None,
         }
     }
 }

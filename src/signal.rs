@@ -139,6 +139,8 @@ pub enum Intent {
     Present {
         /// The shaped action, in the plant's unit.
         action: Action,
+        /// The device's deflection that it was shaped from, −1 to 1, if there is a device.
+        raw: Option<f64>,
         /// The time since the device last confirmed it.
         age: Seconds,
     },
@@ -152,7 +154,7 @@ impl Intent {
     /// An action that the operator decided on at this very tick.
     #[must_use]
     pub const fn fresh(action: f64) -> Self {
-        Self::Present { action: Action(action), age: Seconds(0.0) }
+        Self::Present { action: Action(action), raw: None, age: Seconds(0.0) }
     }
 
     /// The operator's part of the action: 0 when absent.
@@ -161,6 +163,15 @@ impl Intent {
         match self {
             Self::Present { action, .. } => action,
             Self::Absent => Action(0.0),
+        }
+    }
+
+    /// The device's deflection, if there is one.
+    #[must_use]
+    pub const fn raw(self) -> Option<f64> {
+        match self {
+            Self::Present { raw, .. } => raw,
+            Self::Absent => None,
         }
     }
 

@@ -18,6 +18,7 @@ pub mod palette;
 pub mod pen;
 pub mod results;
 pub mod scene;
+pub mod sensitivity;
 pub mod setup;
 pub mod small;
 pub mod terminal;

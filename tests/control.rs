@@ -116,6 +116,10 @@ impl Operator for Pusher {
     fn intent(&mut self, _view: View<'_>) -> Intent {
         Intent::fresh(self.push)
     }
+
+    fn tune(&mut self, sensitivity: f64) {
+        self.push = PUSH * sensitivity;
+    }
 }
 
 /// Notes what it is told, and keeps the policies and the last counts of samples.
@@ -280,6 +284,21 @@ fn begun(entries: &[Entry]) -> Vec<(u32, f64)> {
             _ => None,
         })
         .collect()
+}
+
+/// Sensitivity that is turned reaches the operator at the next tick, and is written down.
+#[test]
+fn a_turned_sensitivity_works_at_the_next_tick_and_is_written_down() {
+    let mut session = Session::new(&profile("main"), true, None);
+    session.ask(Command::Begin);
+    session.tick(2);
+    let diary = session.diary.clone();
+    diary.take();
+    session.ask(Command::Sensitivity(2.0));
+    session.tick(1);
+    let entries = diary.take();
+    assert!(entries.contains(&Entry::Told("sensitivity")), "{entries:?}");
+    assert_eq!(applied(&entries), [2.0 * PUSH]);
 }
 
 #[test]

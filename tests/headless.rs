@@ -22,7 +22,7 @@ const SMALL: &str = "run balance --headless --operator simulated:average --seed 
 const WINDOW: usize = 200;
 
 const STEPS: &str = "phase,episode,step,t,x,x_dot,theta,theta_dot,u_human,u_machine,share,u,\
-    u_applied,reward,success,region,lateness_us";
+    u_applied,reward,success,region,lateness_us,raw";
 const EPISODES: &str = "phase,episode,start,steps,duration_s,end,return,mean_reward,share,\
     success,receptive_fields";
 

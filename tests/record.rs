@@ -6,6 +6,7 @@
 mod samples;
 
 use std::fs;
+use std::path::Path;
 
 use coadapt::random::{Place, Purpose, stream};
 use coadapt::record::folder::{self, Unfinished};
@@ -56,14 +57,14 @@ fn a_session_leaves_the_files_with_the_promised_columns() {
         assert_eq!(
             lines[0],
             "phase,episode,step,t,x,x_dot,theta,theta_dot,u_human,u_machine,\
-            share,u,u_applied,reward,success,region,lateness_us"
+            share,u,u_applied,reward,success,region,lateness_us,raw"
         );
         assert_eq!(
             lines[1],
             "main,1,0,0.0,0.0,1e-300,-0.0,0.3333333333333333,10.0,,1.0,10.0,\
-            1e22,0.30000000000000004,0.0,all,0"
+            1e22,0.30000000000000004,0.0,all,0,"
         );
-        assert_eq!(lines[4], "main,2,0,0.0,0.0,1e-300,-0.0,0.3333333333333333,,,,,,,,,0");
+        assert_eq!(lines[4], "main,2,0,0.0,0.0,1e-300,-0.0,0.3333333333333333,,,,,,,,,0,");
         assert!(steps.ends_with('\n') && !steps.contains('\r'));
         assert_eq!(
             read(&path, "episodes.csv"),
@@ -92,12 +93,31 @@ fn bits(row: &[Option<f64>]) -> Vec<Option<u64>> {
     row.iter().map(|n| n.map(f64::to_bits)).collect()
 }
 
+/// Sessions of before the column `raw` are read all the same.
+#[test]
+fn rows_without_deflections_are_read() {
+    let logs = tempfile::tempdir().unwrap();
+    let (mut recorder, trial) = start(logs.path(), Manner::Virtual);
+    let path = recorder.path().join("steps.csv");
+    recorder.step(StepRow { u_human: Some(3.0), raw: Some(0.25), ..step(1, 0) });
+    recorder.finish(complete(trial)).unwrap();
+    let read = |path: &Path| {
+        let row = reader::Steps::open(path).unwrap().next().unwrap().unwrap();
+        (row.u_human, row.raw)
+    };
+    assert_eq!(read(&path), (Some(3.0), Some(0.25)));
+    let before = fs::read_to_string(&path).unwrap();
+    let before = before.replace(",raw\n", "\n").replace(",0.25\n", "\n");
+    fs::write(&path, before).unwrap();
+    assert_eq!(read(&path), (Some(3.0), None));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
     #[test]
     fn rows_and_policies_read_back_to_the_same_bits(
         state in prop::array::uniform4(number()),
-        cells in prop::array::uniform7(prop::option::of(number())),
+        cells in prop::array::uniform8(prop::option::of(number())),
         t in number(),
         late in any::<u32>(),
         beta in prop::collection::vec(number(), 0..20),
@@ -105,9 +125,9 @@ proptest! {
         let logs = tempfile::tempdir().unwrap();
         let (mut recorder, trial) = start(logs.path(), Manner::Virtual);
         let path = recorder.path().to_owned();
-        let [u_human, u_machine, share, u, u_applied, reward, success] = cells;
+        let [u_human, u_machine, share, u, u_applied, reward, success, raw] = cells;
         recorder.step(StepRow { t, state: State::new(state), u_human, u_machine, share, u,
-            u_applied, reward, success, lateness_us: late, ..step(1, 0) });
+            u_applied, reward, success, raw, lateness_us: late, ..step(1, 0) });
         let policy = a_policy(Model::Memory { beta: beta.clone() });
         recorder.policy(None, Box::new(policy));
         recorder.finish(complete(trial)).unwrap();
@@ -116,7 +136,7 @@ proptest! {
         prop_assert_eq!(rows.len(), 1);
         let row = rows[0].as_ref().unwrap();
         prop_assert_eq!(bits(&cells), bits(&[row.u_human, row.u_machine, row.share, row.u,
-            row.u_applied, row.reward, row.success]));
+            row.u_applied, row.reward, row.success, row.raw]));
         prop_assert_eq!(state.map(f64::to_bits).to_vec(),
             row.state.iter().map(|n| n.to_bits()).collect::<Vec<_>>());
         prop_assert_eq!((t.to_bits(), late), (row.t.to_bits(), row.lateness_us));

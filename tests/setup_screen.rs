@@ -244,7 +244,7 @@ fn a_changed_pole_is_named_and_drawn() {
     let order = desk.begin();
     assert_eq!(
         order.command_line(),
-        "coadapt run balance --set plant.pole_length_m=0.6 --set operator.sensitivity=1.41"
+        "coadapt run balance --set plant.pole_length_m=0.6 --set operator.keyboard.shape.sensitivity=1.41"
     );
     assert_eq!(desk.setup.profile(), &reads(&order, &desk.profiles).unwrap());
 }

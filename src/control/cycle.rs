@@ -318,6 +318,7 @@ impl<W: Witness> Cycle<W> {
             success,
             region: self.crew.task.regions().get(region).map(|r| r.name),
             lateness_us: micros(self.seen.lateness),
+            raw: human.raw().filter(|raw| raw.is_finite()),
         };
         self.crew.witness.step(&row);
         self.see(&row, human, region);
@@ -345,8 +346,8 @@ impl<W: Witness> Cycle<W> {
         match self.crew.operator.intent(View { state, now, rollout_time }) {
             // A device's nonsense is nobody's wish.
             Intent::Present { action, .. } if !action.0.is_finite() => Intent::Absent,
-            Intent::Present { action, age } => {
-                Intent::Present { action: Action(action.0.clamp(-limit, limit)), age }
+            Intent::Present { action, raw, age } => {
+                Intent::Present { action: Action(action.0.clamp(-limit, limit)), raw, age }
             }
             Intent::Absent => Intent::Absent,
         }
@@ -387,6 +388,10 @@ impl<W: Witness> Cycle<W> {
                     self.interrupted = true;
                     self.cause.get_or_insert(cause);
                     Event::Abort
+                }
+                Command::Sensitivity(sensitivity) => {
+                    self.tune(sensitivity);
+                    continue;
                 }
                 Command::Speed(speed) => {
                     self.wanted_speed = if speed > 0.0 { speed } else { 1.0 };

@@ -300,6 +300,14 @@ impl<W: Witness> Cycle<W> {
         }
     }
 
+    /// Turns the operator's sensitivity, and writes it down: the rows after it mean
+    /// something else.
+    pub(super) fn tune(&mut self, sensitivity: f64) {
+        self.crew.operator.tune(sensitivity);
+        let phase = self.stage.moment().map(|moment| moment.phase);
+        self.note("sensitivity", self.stage.moment(), phase, format!("{sensitivity}"));
+    }
+
     /// Writes down what people asked for; ticks speak through their rows.
     fn note_event(&mut self, before: Stage, event: Event) {
         let word = match event {

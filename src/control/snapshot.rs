@@ -103,6 +103,8 @@ pub enum Command {
     Abort(String),
     /// The same, because a signal asked for it or the key that stands for one.
     Interrupt(String),
+    /// From now on the device's deflection counts this many times.
+    Sensitivity(f64),
     /// Run this many times faster than the wall wherever nobody steers.
     Speed(f64),
 }

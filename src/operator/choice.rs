@@ -11,25 +11,16 @@ use super::terminal;
 use crate::check::{Check, Checker};
 
 /// The operators' parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// Hands on the keyboard.
     pub keyboard: terminal::Params,
-    /// Factor on a device's deflection.
-    pub sensitivity: f64,
-}
-
-impl Default for Params {
-    fn default() -> Self {
-        Self { keyboard: terminal::Params::default(), sensitivity: 1.0 }
-    }
 }
 
 impl Check for Params {
     fn check(&self, c: &mut Checker<'_>) {
         self.keyboard.check(&mut c.section("keyboard"));
-        c.range("sensitivity", self.sensitivity, 0.05..=20.0);
     }
 }
 

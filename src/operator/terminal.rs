@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 pub use hold::{Direction, Hold, KeyReleases, Timing};
 
-use super::shaping::Shaping;
+use super::shaping::{Shape, Shaper};
 use super::{Operator, Practice, View};
 use crate::check::{Check, Checker};
 use crate::clock::{Clock, WallClock};
@@ -27,15 +27,26 @@ pub struct Params {
     pub push: f64,
     /// The time in which a push grows to its full strength, s; 0: at once.
     pub rise_s: f64,
+    /// The time in which a full push falls to nothing once its key is let go, s.
+    pub fall_s: f64,
     /// How long a single press pushes where the terminal reports no releases, s.
     pub tap_hold_s: f64,
     /// How long a key repeat pushes there, s; `None`: 1.6 times the measured interval.
     pub repeat_hold_s: Option<f64>,
+    /// From the keys' push to the action.
+    pub shape: Shape,
 }
 
 impl Default for Params {
     fn default() -> Self {
-        Self { push: 0.5, rise_s: 0.06, tap_hold_s: 0.12, repeat_hold_s: None }
+        Self {
+            push: 0.5,
+            rise_s: 0.06,
+            fall_s: 0.0,
+            tap_hold_s: 0.12,
+            repeat_hold_s: None,
+            shape: Shape::default(),
+        }
     }
 }
 
@@ -43,10 +54,12 @@ impl Check for Params {
     fn check(&self, c: &mut Checker<'_>) {
         c.range("push", self.push, 0.01..=1.0);
         c.range("rise_s", self.rise_s, 0.0..=2.0);
+        c.range("fall_s", self.fall_s, 0.0..=2.0);
         c.range("tap_hold_s", self.tap_hold_s, 0.02..=1.0);
         if let Some(hold) = self.repeat_hold_s {
             c.range("repeat_hold_s", hold, 0.02..=1.0);
         }
+        self.shape.check(&mut c.section("shape"));
     }
 }
 
@@ -140,6 +153,7 @@ fn timing(params: &Params) -> Timing {
         tap_hold_s: params.tap_hold_s,
         repeat_hold_s: params.repeat_hold_s,
         rise_s: params.rise_s,
+        fall_s: params.fall_s,
     }
 }
 
@@ -165,14 +179,16 @@ pub struct Keyboard {
     hands: Hands,
     clock: WallClock,
     push: f64,
-    shaping: Shaping,
+    shaper: Shaper,
 }
 
 impl Keyboard {
-    /// The keyboard under `hands`, whose events carry times of `clock`.
+    /// The keyboard under `hands`, whose events carry times of `clock`, for ticks of `tick`
+    /// and actions up to ± `limit`.
     #[must_use]
-    pub fn new(hands: Hands, clock: WallClock, params: &Params, shaping: Shaping) -> Self {
-        Self { hands, clock, push: params.push, shaping }
+    pub fn new(hands: Hands, clock: WallClock, params: &Params, limit: f64, tick: Seconds) -> Self {
+        let shaper = Shaper::new(params.shape, limit, tick);
+        Self { hands, clock, push: params.push, shaper }
     }
 }
 
@@ -184,8 +200,13 @@ impl Operator for Keyboard {
         let now = self.clock.now();
         let hold = self.hands.hold();
         let age = hold.last_event().map_or(0.0, |at| (now - at).0.max(0.0));
-        let action = self.shaping.shape(self.push * hold.push(now));
-        Intent::Present { action: Action(action), age: Seconds(age) }
+        let raw = self.push * hold.push(now);
+        let action = Action(self.shaper.shape(raw));
+        Intent::Present { action, raw: Some(raw), age: Seconds(age) }
+    }
+
+    fn tune(&mut self, sensitivity: f64) {
+        self.shaper.set_sensitivity(sensitivity);
     }
 }
 
@@ -199,8 +220,8 @@ mod tests {
         let params = Params { rise_s: 0.0, ..Params::default() };
         let hands = Hands::new(&params);
         let clock = WallClock::start();
-        let shaping = Shaping { dead_zone: 0.0, sensitivity: 1.0, limit: 10.0 };
-        let mut keyboard = Keyboard::new(hands.clone(), clock, &params, shaping);
+        let tick = Seconds(0.02);
+        let mut keyboard = Keyboard::new(hands.clone(), clock, &params, 10.0, tick);
         let state = State::default();
         let view = View { state: &state, now: Seconds(0.0), rollout_time: Seconds(0.0) };
         hands.set_releases_known(true);

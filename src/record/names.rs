@@ -32,6 +32,9 @@ pub(super) const EVALUATION_COLUMNS: [&str; 8] =
 /// The columns of `events.csv`.
 pub(super) const EVENT_COLUMNS: [&str; 6] = ["time", "phase", "episode", "step", "event", "cause"];
 
+/// The columns at the end of `steps.csv` that came later: sessions of before lack them.
+pub(super) const LATER_STEP_COLUMNS: [&str; 1] = ["raw"];
+
 /// The columns of `steps.csv` before and after the state's.
 pub(super) const STEP_COLUMNS: ([&str; 4], [&str; 9]) = (
     ["phase", "episode", "step", "t"],

@@ -9,7 +9,9 @@ use serde::Deserialize;
 use serde::de::IntoDeserializer;
 use serde::de::value::Error as WordError;
 
-use super::names::{EPISODE_COLUMNS, EVALUATION_COLUMNS, EVENT_COLUMNS, STEP_COLUMNS};
+use super::names::{
+    EPISODE_COLUMNS, EVALUATION_COLUMNS, EVENT_COLUMNS, LATER_STEP_COLUMNS, STEP_COLUMNS,
+};
 use super::{EpisodeRow, Error, EvaluationRow, EventRow, StepRow, table};
 use crate::signal::{State, Tallied};
 
@@ -17,6 +19,8 @@ use crate::signal::{State, Tallied};
 pub struct Steps {
     lines: Lines,
     columns: Vec<String>,
+    /// Whether the deflections of the device were recorded already.
+    has_raw: bool,
 }
 
 impl Steps {
@@ -32,7 +36,9 @@ impl Steps {
         let expected: Vec<&str> =
             before.into_iter().chain(columns.iter().map(String::as_str)).chain(after).collect();
         lines.demand(&expected)?;
-        Ok(Self { lines, columns })
+        let has_raw =
+            lines.header.iter().nth(expected.len()) == LATER_STEP_COLUMNS.first().copied();
+        Ok(Self { lines, columns, has_raw })
     }
 
     /// The names of the state's numbers.
@@ -66,6 +72,7 @@ impl Steps {
             success: cells.optional()?,
             region: cells.optional()?,
             lateness_us: cells.value()?,
+            raw: if self.has_raw { cells.optional()? } else { None },
         })
     }
 }

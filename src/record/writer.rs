@@ -15,8 +15,8 @@ use super::document;
 use super::evaluation::write_evaluation;
 use super::folder::Folder;
 use super::names::{
-    CHECKPOINT, EPISODE_COLUMNS, EPISODES, EVALUATION, EVENT_COLUMNS, EVENTS, SESSION,
-    STEP_COLUMNS, STEPS,
+    CHECKPOINT, EPISODE_COLUMNS, EPISODES, EVALUATION, EVENT_COLUMNS, EVENTS, LATER_STEP_COLUMNS,
+    SESSION, STEP_COLUMNS, STEPS,
 };
 use super::policy;
 use super::table::Table;
@@ -88,7 +88,8 @@ impl<M: Storable> Recorder<M> {
     ) -> Result<Self, Error> {
         let (before, after) = STEP_COLUMNS;
         let state = columns.state.iter().map(AsRef::as_ref);
-        let header: Vec<&str> = before.into_iter().chain(state).chain(after).collect();
+        let header: Vec<&str> =
+            before.into_iter().chain(state).chain(after).chain(LATER_STEP_COLUMNS).collect();
         let counted = columns.tally.iter().map(AsRef::as_ref);
         let episodes: Vec<&str> = EPISODE_COLUMNS.into_iter().chain(counted).collect();
         let tables = Tables {

@@ -6,7 +6,6 @@ use super::RunError;
 use super::session::{Company, Keys, usage};
 use crate::learner::{Learner, Model};
 use crate::operator::script::Script;
-use crate::operator::shaping::Shaping;
 use crate::operator::simulated::{self, Kind, Skill};
 use crate::operator::terminal::Keyboard;
 use crate::operator::{self, Choice, Operator};
@@ -126,8 +125,7 @@ pub(super) fn steer(
         }
         Choice::Keyboard => match company {
             Company::Attended(Keys { hands, clock }) => {
-                let shaping = Shaping { dead_zone: 0.0, sensitivity: params.sensitivity, limit };
-                Box::new(Keyboard::new(hands.clone(), *clock, &params.keyboard, shaping))
+                Box::new(Keyboard::new(hands.clone(), *clock, &params.keyboard, limit, tick))
             }
             Company::Headless => {
                 return Err(RunError::Usage(

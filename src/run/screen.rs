@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use super::outcome::Finished;
-use super::session::{Company, Keys, Session};
+use super::session::{Company, KEYBOARD, Keys, Session};
 use super::shutdown::Shutdown;
 use super::{RunError, exit_code, sentences, signal_code, tell};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -285,6 +285,8 @@ fn info(session: &Session) -> Info {
         regions: scene::regions_of(&profile.experiment),
         field_cap: profile.learner.max_fields,
         operator: sidecar.operator.clone(),
+        sensitivity: (sidecar.operator == KEYBOARD)
+            .then_some(profile.operator.keyboard.shape.sensitivity),
     }
 }
 

@@ -28,7 +28,7 @@ use crate::session::{Moment, Phase, Trial};
 use crate::study::evaluate::simulated_backend;
 
 /// The word of the operator at the keyboard.
-const KEYBOARD: &str = "keyboard";
+pub(super) const KEYBOARD: &str = "keyboard";
 /// The largest number that a person may give a trial.
 const MOST_TRIALS: u32 = 999_999;
 

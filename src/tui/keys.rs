@@ -60,6 +60,10 @@ pub enum Action {
     Discard,
     /// Run faster than the wall where nobody steers.
     Faster,
+    /// Raise the device's sensitivity,
+    MoreSensitive,
+    /// or lower it.
+    LessSensitive,
     /// Show or hide share and success.
     Progress,
     /// Show the scene only, or everything.
@@ -145,6 +149,15 @@ pub const BINDINGS: &[Binding] = {
             "faster while nobody steers: 1 4 16× max",
             A::Faster,
         ),
+        bind(
+            Live,
+            &[Char('+'), Char('=')],
+            "+",
+            "",
+            "raise your device's sensitivity",
+            A::MoreSensitive,
+        ),
+        bind(Live, &[Char('-')], "-", "", "lower it", A::LessSensitive),
         bind(Live, &[Char('p')], "p", "progress", "show or hide share and success", A::Progress),
         bind(Live, &[Char('v')], "v", "subject", "the subject's view, or all", A::SubjectView),
         bind(Live, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
@@ -179,7 +192,15 @@ pub fn action(screen: Screen, event: KeyEvent) -> Option<Action> {
     };
     let found = of(screen).find(|binding| binding.keys.contains(&code))?.action?;
     // Held keys repeat; only what is harmless to do often follows them.
-    let repeats = matches!(found, Action::Next | Action::Previous | Action::Left | Action::Right);
+    let repeats = matches!(
+        found,
+        Action::Next
+            | Action::Previous
+            | Action::Left
+            | Action::Right
+            | Action::MoreSensitive
+            | Action::LessSensitive
+    );
     (event.kind == KeyEventKind::Press || repeats).then_some(found)
 }
 

@@ -72,6 +72,8 @@ pub struct Info {
     pub field_cap: u32,
     /// The operator and how it is known, such as "keyboard, releases reported".
     pub operator: String,
+    /// The sensitivity of the operator's device; `None` where there is no device.
+    pub sensitivity: Option<f64>,
 }
 
 impl Info {

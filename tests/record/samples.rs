@@ -77,6 +77,7 @@ pub fn step(episode: u32, step: u32) -> StepRow {
         success: Some(0.0),
         region: Some("all"),
         lateness_us: 0,
+        raw: None,
     }
 }
 

@@ -46,8 +46,10 @@ pub struct Timing {
     pub tap_hold_s: f64,
     /// How long a repeat pushes then; `None`: learned from the repeats.
     pub repeat_hold_s: Option<f64>,
-    /// How long a push takes to grow to its full strength.
+    /// How long a push takes to grow to its full strength,
     pub rise_s: f64,
+    /// and a full one to fall to nothing once its key is let go.
+    pub fall_s: f64,
 }
 
 /// A repeat pushes for this many intervals between repeats, when learned.
@@ -70,12 +72,21 @@ struct Push {
     until: Option<Seconds>,
 }
 
+/// What is left of a push whose key was let go.
+#[derive(Clone, Copy, Debug)]
+struct Fall {
+    to: Direction,
+    from: f64,
+    since: Seconds,
+}
+
 /// The keys' state. Times must not run backwards.
 #[derive(Clone, Debug)]
 pub struct Hold {
     timing: Timing,
     releases: KeyReleases,
     push: Option<Push>,
+    fall: Option<Fall>,
     /// The keys held, left and right, as reported.
     held: [bool; 2],
     last_event: Option<(Direction, Seconds)>,
@@ -90,6 +101,7 @@ impl Hold {
             timing,
             releases: KeyReleases::Estimated,
             push: None,
+            fall: None,
             held: [false; 2],
             last_event: None,
             interval: None,
@@ -157,6 +169,7 @@ impl Hold {
         self.last_event = Some((direction, now));
         self.set_held(direction, false);
         if self.push.is_some_and(|push| push.to == direction) {
+            self.fall = self.falling(now);
             self.push = None;
             let other = match self.held {
                 [true, _] => Direction::Left,
@@ -171,6 +184,7 @@ impl Hold {
     pub fn release_all(&mut self) {
         self.held = [false; 2];
         self.push = None;
+        self.fall = None;
         // The next press is a new one, not a repeat.
         self.last_event = self.last_event.map(|(_, at)| (Direction::Stop, at));
     }
@@ -178,20 +192,44 @@ impl Hold {
     /// The push at `now`, from -1 (left) to 1 (right).
     #[must_use]
     pub fn push(&self, now: Seconds) -> f64 {
-        let Some(push) = self.push else { return 0.0 };
-        if push.until.is_some_and(|until| now >= until) {
-            return 0.0;
+        let (to, strength) = match self.push {
+            Some(push) if push.until.is_none_or(|until| now < until) => {
+                (push.to, self.grown(&push, now))
+            }
+            _ => match self.falling(now) {
+                Some(fall) => (fall.to, fall.from),
+                None => return 0.0,
+            },
+        };
+        match to {
+            Direction::Left => -strength,
+            Direction::Right => strength,
+            Direction::Stop => 0.0,
         }
-        let grown = if self.timing.rise_s > 0.0 {
+    }
+
+    /// How strong `push` is at `now`.
+    fn grown(&self, push: &Push, now: Seconds) -> f64 {
+        if self.timing.rise_s > 0.0 {
             ((now - push.since).0 / self.timing.rise_s).clamp(0.0, 1.0)
         } else {
             1.0
-        };
-        match push.to {
-            Direction::Left => -grown,
-            Direction::Right => grown,
-            Direction::Stop => 0.0,
         }
+    }
+
+    /// What is left at `now` of the push under way if it ends then, or of the one that ended.
+    fn falling(&self, now: Seconds) -> Option<Fall> {
+        let fall = match self.push {
+            Some(push) => {
+                let since = push.until.filter(|until| *until < now).unwrap_or(now);
+                Fall { to: push.to, from: self.grown(&push, since), since }
+            }
+            None => self.fall?,
+        };
+        let fallen = (now - fall.since).0 / self.timing.fall_s;
+        let left = fall.from - if self.timing.fall_s > 0.0 { fallen } else { fall.from };
+        // What rounding leaves of a push is none.
+        (left > 1e-9).then_some(Fall { to: fall.to, from: left, since: now })
     }
 
     /// Notes the event and returns the time since the same key's last, if it was the last.
@@ -226,7 +264,13 @@ impl Hold {
                     _ => until,
                 };
             }
-            _ => self.push = Some(Push { to, since: now, until }),
+            _ => {
+                // What is left of the last push in this direction is not to be grown again.
+                let left = self.falling(now).filter(|fall| fall.to == to);
+                let ahead = left.map_or(0.0, |fall| fall.from * self.timing.rise_s);
+                self.fall = None;
+                self.push = Some(Push { to, since: now - Seconds(ahead), until });
+            }
         }
     }
 
@@ -245,7 +289,8 @@ mod tests {
     use Direction::{Left, Right, Stop};
     use proptest::prelude::*;
 
-    const TIMING: Timing = Timing { tap_hold_s: 0.12, repeat_hold_s: None, rise_s: 0.0 };
+    const TIMING: Timing =
+        Timing { tap_hold_s: 0.12, repeat_hold_s: None, rise_s: 0.0, fall_s: 0.0 };
 
     fn at(s: f64) -> Seconds {
         Seconds(s)
@@ -300,6 +345,37 @@ mod tests {
     }
 
     #[test]
+    fn a_push_falls_linearly_and_its_rest_is_not_grown_again() {
+        let mut hold = Hold::new(Timing { rise_s: 0.1, fall_s: 0.2, ..TIMING });
+        hold.set_knowledge(KeyReleases::Reported);
+        hold.press(Right, at(0.0));
+        hold.release(Right, at(1.0));
+        assert!((hold.push(at(1.05)) - 0.75).abs() < 1e-12);
+        hold.press(Right, at(1.1));
+        assert!((hold.push(at(1.1)) - 0.5).abs() < 1e-12);
+        assert!((hold.push(at(1.15)) - 1.0).abs() < 1e-12);
+        // The other way begins from nothing, and a stop leaves nothing.
+        hold.release(Right, at(1.2));
+        hold.press(Left, at(1.25));
+        assert_eq!(hold.push(at(1.25)), 0.0);
+        assert!((hold.push(at(1.3)) + 0.5).abs() < 1e-12);
+        hold.press(Stop, at(1.4));
+        assert_eq!(hold.push(at(1.4)), 0.0);
+        hold.press(Left, at(2.0));
+        hold.release(Left, at(3.0));
+        assert_eq!(hold.push(at(3.2)), 0.0);
+    }
+
+    #[test]
+    fn an_estimated_push_falls_from_where_its_time_was_over() {
+        let mut hold = Hold::new(Timing { fall_s: 0.1, ..TIMING });
+        hold.press(Left, at(0.0));
+        assert_eq!(hold.push(at(0.119)), -1.0);
+        assert!((hold.push(at(0.17)) + 0.5).abs() < 1e-12);
+        assert_eq!(hold.push(at(0.23)), 0.0);
+    }
+
+    #[test]
     fn the_first_release_changes_what_is_known() {
         let mut hold = Hold::new(TIMING);
         hold.press(Left, at(0.0));
@@ -314,9 +390,10 @@ mod tests {
         #[test]
         fn keys_that_all_end_released_leave_0(
             known in any::<bool>(),
+            (rise_s, fall_s) in (0.0..0.3_f64, 0.0..0.3_f64),
             events in proptest::collection::vec((0..3_u8, 0..3_u8, 0.0..0.5_f64), 0..60),
         ) {
-            let mut hold = Hold::new(TIMING);
+            let mut hold = Hold::new(Timing { rise_s, fall_s, ..TIMING });
             if known {
                 hold.set_knowledge(KeyReleases::Reported);
             }
@@ -334,7 +411,7 @@ mod tests {
             for key in [Left, Right, Stop] {
                 hold.release(key, at(now));
             }
-            prop_assert_eq!(hold.push(at(now)), 0.0);
+            prop_assert_eq!(hold.push(at(now + fall_s)), 0.0);
         }
     }
 }

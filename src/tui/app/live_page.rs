@@ -13,6 +13,7 @@ use crate::session::machine::Stage;
 use crate::signal::Seconds;
 use crate::tui::keys::{self, Action};
 use crate::tui::live::{self, History, Ui, View};
+use crate::tui::sensitivity;
 use crate::tui::terminal::{Screen, look};
 
 /// Numbers are renewed this often, so that they can be read.
@@ -180,6 +181,8 @@ impl Page {
             Action::Discard => self.ask(Command::Discard),
             Action::Stop => self.ask(Command::Stop),
             Action::Faster => self.faster(),
+            Action::MoreSensitive => self.tune(true),
+            Action::LessSensitive => self.tune(false),
             Action::Progress => self.ui.show_progress = !self.ui.show_progress,
             Action::SubjectView => self.ui.subject_view = !self.ui.subject_view,
             Action::Help => self.ui.help_open = !self.ui.help_open,
@@ -205,6 +208,19 @@ impl Page {
     fn ask(&mut self, command: Command) {
         // A session that hears nothing any more is over; its results come next.
         let _ = self.running.watcher.ask(command);
+    }
+
+    /// Turns the sensitivity of the person's device, and shows where it stands until the
+    /// next key.
+    fn tune(&mut self, more: bool) {
+        let Some(sensitivity) = self.running.info.sensitivity else {
+            self.ui.message = Some("nobody's device steers: no sensitivity to turn".to_owned());
+            return;
+        };
+        let turned = sensitivity::stepped(sensitivity, more);
+        self.running.info.sensitivity = Some(turned);
+        self.ui.message = Some(sensitivity::line(turned));
+        self.ask(Command::Sensitivity(turned));
     }
 
     fn faster(&mut self) {

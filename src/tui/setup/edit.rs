@@ -11,10 +11,11 @@ use crate::operator::simulated::{Kind, Skill};
 use crate::profile::{Document, Experiment, Fault, Order, Profile, WantedMode};
 use crate::session::Subject;
 use crate::session::plan::Wanted;
+use crate::tui::sensitivity;
 
 /// The key of the pole's length.
 pub(super) const POLE_LENGTH: &str = "plant.pole_length_m";
-const SENSITIVITY: &str = "operator.sensitivity";
+pub(super) const SENSITIVITY: &str = "operator.keyboard.shape.sensitivity";
 const PHASES: &str = "session.phases";
 const PRACTICE_ROLLOUTS: &str = "session.introduction_rollouts";
 const PRACTICE_DURATION: &str = "session.introduction_duration_s";
@@ -283,11 +284,9 @@ impl Setup {
         };
     }
 
-    /// Steps of an eighth or so, evenly along the slider.
     fn change_sensitivity(&mut self, forward: bool) {
-        let level = sensitivity_level(self.profile.operator.sensitivity);
-        let level = (level + if forward { 1.0 } else { -1.0 }).clamp(-LEVELS, LEVELS);
-        let value = (10.0_f64.powf(level / 20.0) * 100.0).round() / 100.0;
+        let sensitivity = self.profile.operator.keyboard.shape.sensitivity;
+        let value = sensitivity::stepped(sensitivity, forward);
         self.change(SENSITIVITY, &format!("{value:?}"));
     }
 
@@ -403,14 +402,6 @@ pub(super) fn pole_length(profile: &Profile) -> Option<f64> {
 
 fn length_words(length_m: f64) -> String {
     format!("{:?}", (length_m * 1e6).round() / 1e6)
-}
-
-/// The slider's ends: 10^(±26/20) is about 0.05 and 20.
-pub(super) const LEVELS: f64 = 26.0;
-
-/// Where the slider stands.
-pub(super) fn sensitivity_level(sensitivity: f64) -> f64 {
-    (sensitivity.log10() * 20.0).round().clamp(-LEVELS, LEVELS)
 }
 
 const MODES: [WantedMode; 3] =

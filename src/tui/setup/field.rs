@@ -108,7 +108,7 @@ impl Field {
             | "session.introduction_duration_s" => Some(Self::Introduction),
             "session.main_rollouts" | "session.main_duration_s" => Some(Self::Main),
             "session.autonomous_rollouts" => Some(Self::Autonomous),
-            "operator.sensitivity" => Some(Self::Sensitivity),
+            super::edit::SENSITIVITY => Some(Self::Sensitivity),
             super::edit::POLE_LENGTH => Some(Self::Pole),
             _ => None,
         }

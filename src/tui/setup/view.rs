@@ -2,7 +2,7 @@
 
 use ratatui::Frame;
 
-use super::edit::{LEVELS, pole_length, sensitivity_level, word};
+use super::edit::{pole_length, word};
 use super::lines::{Light, Signs, choice, command, input, note, push, slider, tick, value, window};
 use super::prompt::Prompt;
 use super::{Field, Setup, Shelf};
@@ -13,6 +13,7 @@ use crate::tui::keys::Screen;
 use crate::tui::palette::{Look, Role};
 use crate::tui::pen::Pen;
 use crate::tui::scene::{self, Scene};
+use crate::tui::sensitivity;
 use crate::tui::text::{cut, fixed, signed, wrapped};
 use crate::tui::{help, small};
 
@@ -262,9 +263,13 @@ impl View<'_> {
     fn how(&self, pen: &mut Pen<'_>) {
         let setup = self.setup;
         self.label(pen, 12, "sensitivity", &[Field::Sensitivity]);
-        let sensitivity = setup.profile.operator.sensitivity;
-        let at = (sensitivity_level(sensitivity) + LEVELS) / (2.0 * LEVELS);
-        slider(pen, (VALUE, 12, 27), at, self.light(Field::Sensitivity));
+        let sensitivity = setup.profile.operator.keyboard.shape.sensitivity;
+        slider(
+            pen,
+            (VALUE, 12, 27),
+            sensitivity::part(sensitivity),
+            self.light(Field::Sensitivity),
+        );
         pen.text(43, 12, &fixed(sensitivity, 5, 2), Role::Text);
 
         if pole_length(&setup.profile).is_some() {
