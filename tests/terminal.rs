@@ -169,7 +169,7 @@ fn signals_end_a_session_and_give_the_terminal_back() {
         terminal.is_given_back();
         assert_eq!(terminal.session(FOLDER)["status"], "interrupted", "SIG{signal}");
         let rows = fs::read_to_string(terminal.at(FOLDER).join("steps.csv")).unwrap();
-        assert!(rows.ends_with(",,,,,,,,,0\n"), "no ending state: {rows}");
+        assert!(rows.ends_with(",,,,,,,,,0,\n"), "no ending state: {rows}");
     }
 }
 
@@ -182,7 +182,7 @@ fn a_closed_terminal_ends_a_session_as_a_hang_up_does() {
     assert_eq!(terminal.session(FOLDER)["status"], "interrupted");
     assert!(terminal.pushes(FOLDER).len() > 10);
     let rows = fs::read_to_string(terminal.at(FOLDER).join("steps.csv")).unwrap();
-    assert!(rows.ends_with(",,,,,,,,,0\n"), "no ending state: {rows}");
+    assert!(rows.ends_with(",,,,,,,,,0,\n"), "no ending state: {rows}");
 }
 
 #[test]
