@@ -589,6 +589,44 @@ fn profiles_are_listed_shown_and_checked() {
     desk.succeed("run own.ron --headless --operator none --rollouts 1 --phases main --seed 1");
 }
 
+/// A recorded session as a script: the same seed gives the same session, to the byte.
+#[test]
+fn a_recorded_session_steers_once_more() {
+    let desk = Desk::new();
+    let line = "run swing-up --headless --seed 4 --duration 60 --mode simultaneous";
+    desk.succeed(&format!("{line} --operator simulated:average --subject S01"));
+    let first = "logs/S01/001-swing-up-simultaneous";
+    desk.succeed(&format!("{line} --operator script:{first} --subject S02"));
+    for name in ["steps.csv", "episodes.csv", "policy.json"] {
+        let read = |folder: &str| fs::read(desk.at(folder).join(name)).unwrap();
+        let second = first.replace("S01", "S02");
+        assert!(read(first) == read(&second), "{name} differs");
+    }
+    // Nobody is there in a rollout that was not recorded: that is counted, and not learned.
+    let line = line.replace("--duration 60", "--rollouts 5 --phases main");
+    let more = desk.succeed(&format!("{line} --json --operator script:{first} --subject S03"));
+    let more: Value = serde_json::from_str(&more).unwrap();
+    assert_eq!(more["phases"]["main"]["samples"], 3000, "60 s of 100 were steered");
+    let events = desk.at("logs/S03/001-swing-up-simultaneous/events.csv");
+    let events = fs::read_to_string(events).unwrap();
+    for rollout in [4, 5] {
+        assert!(
+            events.contains(&format!(
+                "main,{rollout},1000,operator_absent,nobody steered at 1000 of 1000 ticks"
+            )),
+            "{events}"
+        );
+    }
+    assert_eq!(events.matches("operator_absent").count(), 2, "{events}");
+    let refused = desk.run(&format!("run balance --headless --operator script:{first}"));
+    let message = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(message.contains("a session of swing-up, not of balance"), "{message}");
+    let refused = desk.run("run balance --headless --operator script:logs");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("session.json"), "{}", text(&refused.stderr));
+}
+
 #[test]
 fn a_script_steers_by_its_table() {
     let desk = Desk::new();

@@ -99,6 +99,8 @@ pub(super) struct Rollout {
     pub(super) tally: Box<dyn Tally>,
     /// Samples that the learner refused, and why.
     pub(super) refused: Option<(u64, Refusal)>,
+    /// Ticks at which nobody was there to steer.
+    pub(super) absent: u32,
 }
 
 impl Default for Rollout {
@@ -109,6 +111,7 @@ impl Default for Rollout {
             total_measure: 0.0,
             tally: Box::new(Nothing),
             refused: None,
+            absent: 0,
         }
     }
 }
@@ -297,6 +300,7 @@ impl<W: Witness> Cycle<W> {
             });
         }
         if moment.phase.is_steered() {
+            self.rollout.absent += u32::from(!human.is_present());
             let told =
                 Feedback { state: &state, applied: Action(applied), reward, next: &next, end };
             self.crew.operator.told(&told);

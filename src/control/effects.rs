@@ -171,6 +171,11 @@ impl<W: Witness> Cycle<W> {
             let cause = format!("{count} of this rollout's samples were not learned: {why}");
             self.note("samples_refused", Some(moment), None, cause);
         }
+        if self.rollout.absent > 0 {
+            let (absent, all) = (self.rollout.absent, moment.step);
+            let cause = format!("nobody steered at {absent} of {all} ticks: not learned");
+            self.note("operator_absent", Some(moment), None, cause);
+        }
         let row = self.episode_row(moment, end);
         self.crew.witness.episode(&row);
         if let Some(publisher) = &self.crew.publisher {

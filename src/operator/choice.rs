@@ -31,7 +31,7 @@ pub enum Choice {
     /// Hands on the keyboard.
     #[default]
     Keyboard,
-    /// The table in a file.
+    /// The table in a file, or what was done in a recorded session.
     Script(PathBuf),
     /// A model of a person.
     Simulated(Skill, Kind),
@@ -43,7 +43,9 @@ pub enum Choice {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownOperator {
     /// No such operator.
-    #[error("`{0}` is no operator; choose keyboard, script:FILE, simulated:SKILL[:TYPE] or none")]
+    #[error(
+        "`{0}` is no operator; choose keyboard, script:FILE (a table, or a session's folder), simulated:SKILL[:TYPE] or none"
+    )]
     Operator(String),
     /// No such skill or type.
     #[error(transparent)]

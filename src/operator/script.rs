@@ -31,11 +31,22 @@ type Address = (Option<u8>, Option<u32>);
 /// A phase's word in scripts and its number in [`Place`].
 pub type PhaseWord = (&'static str, u8);
 
-/// A row: the value `u` from the time `t`, s, on.
+/// A row: the value `u` from the time `t`, s, on; nobody is there where it is `None`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Row {
     t: f64,
-    u: f64,
+    u: Option<f64>,
+}
+
+/// A row of a recorded session: what the person did then.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recorded {
+    /// The phase and the rollout.
+    pub place: Place,
+    /// The time within the rollout, s.
+    pub t: f64,
+    /// The action, in the plant's unit; `None` where nobody was there.
+    pub u: Option<f64>,
 }
 
 /// One fault in a script.
@@ -122,9 +133,26 @@ pub struct Script {
     current: Option<Address>,
     /// The number of rows whose time has come.
     passed: usize,
+    /// What is wanted where no row speaks.
+    otherwise: Intent,
 }
 
 impl Script {
+    /// Does once more what was recorded in `rows`, in their order: of a rollout that was
+    /// repeated the last time. Where nothing was recorded nobody is there.
+    #[must_use]
+    pub fn recorded(rows: impl IntoIterator<Item = Recorded>, limit: f64) -> Self {
+        let mut tables = BTreeMap::<Address, Vec<Row>>::new();
+        for Recorded { place, t, u } in rows {
+            let table = tables.entry((Some(place.phase), Some(place.rollout))).or_default();
+            if table.last().is_some_and(|last| last.t >= t) {
+                table.clear();
+            }
+            table.push(Row { t, u });
+        }
+        Self { tables, limit, current: None, passed: 0, otherwise: Intent::Absent }
+    }
+
     /// Reads the script in `file`. `phases` are the words allowed in the column `phase`;
     /// actions are clipped to ± `limit`.
     ///
@@ -151,7 +179,8 @@ impl Script {
         let mut faults = Faults::default();
         let tables = parse::tables(&bytes, is_ron, phases, &mut faults);
         if faults.listed.is_empty() {
-            Ok(Self { tables, limit, current: None, passed: 0 })
+            let otherwise = Intent::fresh(0.0);
+            Ok(Self { tables, limit, current: None, passed: 0, otherwise })
         } else {
             let Faults { listed, more } = faults;
             Err(ScriptError::Rows { file: file.to_owned(), faults: listed, more })
@@ -175,8 +204,11 @@ impl Operator for Script {
         while rows.get(self.passed).is_some_and(|row| row.t <= now) {
             self.passed += 1;
         }
-        let last = self.passed.checked_sub(1).and_then(|last| rows.get(last));
-        Intent::fresh(last.map_or(0.0, |row| row.u.clamp(-self.limit, self.limit)))
+        match self.passed.checked_sub(1).and_then(|last| rows.get(last)) {
+            Some(Row { u: Some(u), .. }) => Intent::fresh(u.clamp(-self.limit, self.limit)),
+            Some(Row { u: None, .. }) => Intent::Absent,
+            None => self.otherwise,
+        }
     }
 }
 
@@ -211,6 +243,26 @@ mod tests {
             assert_eq!(follow(&mut script, 2, 1, &[0.02 * 3.0, 0.5]), [2.0, 10.0]);
             assert_eq!(follow(&mut script, 2, 3, &[0.0]), [3.0]);
         }
+    }
+
+    #[test]
+    fn a_recording_is_done_once_more_and_nobody_is_there_beyond_it() {
+        let place = |rollout| Place { phase: 2, rollout, attempt: 0 };
+        let rows = [(1, 0.0, 5.0), (1, 0.02, 6.0), (1, 0.0, 1.0), (1, 0.02, 99.0), (3, 0.0, 4.0)];
+        let rows = rows.map(|(rollout, t, u)| Recorded { place: place(rollout), t, u: Some(u) });
+        let end = Recorded { place: place(3), t: 0.02, u: None };
+        let mut script = Script::recorded(rows.into_iter().chain([end]), 10.0);
+        assert_eq!(follow(&mut script, 2, 1, &[0.0, 0.02]), [1.0, 10.0]);
+        let state = State::default();
+        let mut is_there = |rollout, t| {
+            script.begin(place(rollout), Practice::default());
+            let view = View { state: &state, now: Seconds(0.0), rollout_time: Seconds(t) };
+            script.intent(view).is_present()
+        };
+        assert_eq!(
+            [(2, 0.0), (3, 0.0), (3, 0.02)].map(|(k, t)| is_there(k, t)),
+            [false, true, false]
+        );
     }
 
     #[test]

@@ -1,17 +1,17 @@
 //! What an order comes to on this disk: which policy, which mode, which operator.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::RunError;
 use super::session::{Company, Keys, usage};
 use crate::learner::{Learner, Model};
-use crate::operator::script::Script;
+use crate::operator::script::{Recorded, Script};
 use crate::operator::simulated::{self, Kind, Skill};
 use crate::operator::terminal::Keyboard;
 use crate::operator::{self, Choice, Operator};
 use crate::profile::{Experiment, Order, Profile};
 use crate::random::{Place, Purpose, stream};
-use crate::record::{self, assignment, folder, policy};
+use crate::record::{self, assignment, folder, policy, reader};
 use crate::session::plan::Wanted;
 use crate::session::{Moment, Phase};
 use crate::sharing::Mode;
@@ -115,6 +115,7 @@ pub(super) fn steer(
     let params = &profile.operator;
     Ok(match choice {
         Choice::None => Box::new(operator::Nobody),
+        Choice::Script(folder) if folder.is_dir() => Box::new(recorded(folder, profile, limit)?),
         Choice::Script(file) => {
             let phases = [Phase::Introduction, Phase::Main]
                 .map(|phase| (phase.word(), Moment::start_of(phase).place().phase));
@@ -137,6 +138,33 @@ pub(super) fn steer(
             }
         },
     })
+}
+
+/// What the person did in the session in `folder`, to be done once more.
+fn recorded(folder: &Path, profile: &Profile, limit: f64) -> Result<Script, RunError> {
+    let refused = |error: record::Error| {
+        RunError::Usage(format!("--operator script:{}: {error}", folder.display()))
+    };
+    let session = record::read_sidecar(&folder.join("session.json")).map_err(refused)?;
+    let task = profile.experiment.name();
+    if session.task != task {
+        return Err(RunError::Usage(format!(
+            "--operator script:{}: this is a session of {}, not of {task}; give one of {task}",
+            folder.display(),
+            session.task
+        )));
+    }
+    let steps = reader::Steps::open(&folder.join("steps.csv")).map_err(refused)?;
+    let mut rows = Vec::new();
+    for row in steps {
+        let row = row.map_err(refused)?;
+        if row.phase.is_steered() {
+            let phase = Moment::start_of(row.phase).place().phase;
+            let place = Place { phase, rollout: row.episode, attempt: 0 };
+            rows.push(Recorded { place, t: row.t, u: row.u_human });
+        }
+    }
+    Ok(Script::recorded(rows, limit))
 }
 
 /// A person who is not there, at the plant of `experiment`.

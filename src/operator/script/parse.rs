@@ -184,7 +184,7 @@ impl Builder<'_> {
                     format!("t is {t}; allowed is a time after {} of the row before", last.t);
                 self.faults.push(at, what);
             }
-            _ => table.push(Row { t, u }),
+            _ => table.push(Row { t, u: Some(u) }),
         }
     }
 }
