@@ -84,7 +84,11 @@ fn wrong_scripts_name_their_line() {
     fs::write(desk.at("latin.csv"), b"t,u\n0,\xff\n").unwrap();
     refuses(&desk, &format!("{run} script:latin.csv"), &["latin.csv:2:3", "UTF-8"]);
     fs::create_dir(desk.at("folder")).unwrap();
-    refuses(&desk, &format!("{run} script:folder"), &["folder", "not a plain file"]);
+    refuses(
+        &desk,
+        &format!("{run} script:folder"),
+        &["folder", "session.json is missing", "a table"],
+    );
     refuses(&desk, &format!("{run} script:/dev/zero"), &["/dev/zero", "not a plain file"]);
     refuses(&desk, &format!("{run} script:missing.csv"), &["missing.csv", "No such file"]);
     refuses(&desk, &format!("{run} script:"), &["script:FILE"]);

@@ -145,7 +145,16 @@ fn recorded(folder: &Path, profile: &Profile, limit: f64) -> Result<Script, RunE
     let refused = |error: record::Error| {
         RunError::Usage(format!("--operator script:{}: {error}", folder.display()))
     };
-    let session = record::read_sidecar(&folder.join("session.json")).map_err(refused)?;
+    let file = folder.join("session.json");
+    if !file.exists() {
+        return Err(RunError::Usage(format!(
+            "--operator script:{}: this folder is no recorded session, for session.json is \
+             missing; give a session's folder, such as logs/S07/001-balance-simultaneous, or a \
+             table",
+            folder.display()
+        )));
+    }
+    let session = record::read_sidecar(&file).map_err(refused)?;
     let task = profile.experiment.name();
     if session.task != task {
         return Err(RunError::Usage(format!(
