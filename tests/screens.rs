@@ -399,6 +399,17 @@ fn between_the_phases() {
 }
 
 #[test]
+fn a_turned_sensitivity_is_shown_in_place_of_the_keys() {
+    for (glyphs, end) in [(Glyphs::Braille, "┤ +   1.41"), (Glyphs::Ascii, "| +   1.41")] {
+        let look = Look { glyphs, ..Look::default() };
+        let ui = Ui { tuned: Some(1.41), look, ..Ui::default() };
+        let shown = picture(80, 24, &info(), &running(Phase::Main), &ui).to_string();
+        let last = shown.trim_end().lines().last().unwrap();
+        assert!(last.contains("sensitivity") && last.contains(end), "{last}");
+    }
+}
+
+#[test]
 fn the_keys_and_a_message() {
     let ui = Ui { help_open: true, ..Ui::default() };
     small("help", &info(), &running(Phase::Main), &ui);
@@ -682,6 +693,7 @@ proptest! {
             subject_view: flags & 2 == 0,
             help_open: flags & 4 == 0,
             message: (flags & 8 == 0).then(|| "字".repeat(60)),
+            tuned: (flags & 32 == 0).then_some(speed),
             look: Look { glyphs, ..Look::default() },
         };
         let mut info = info();

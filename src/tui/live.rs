@@ -124,6 +124,8 @@ pub struct Ui {
     pub help_open: bool,
     /// A word to the person, in place of the line of keys.
     pub message: Option<String>,
+    /// The sensitivity that was just turned, in the same place.
+    pub tuned: Option<f64>,
     /// Glyphs and colours.
     pub look: Look,
 }
@@ -135,6 +137,7 @@ impl Default for Ui {
             subject_view: false,
             help_open: false,
             message: None,
+            tuned: None,
             look: Look::default(),
         }
     }
@@ -214,12 +217,16 @@ impl View<'_> {
         y: u16,
         otherwise: impl FnOnce(&mut Pen<'_>),
     ) {
-        match &self.ui.message {
-            Some(message) => {
-                let room = usize::from(pen.width().saturating_sub(2));
+        let room = usize::from(pen.width().saturating_sub(2));
+        match (&self.ui.message, self.ui.tuned) {
+            (Some(message), _) => {
                 pen.text(1, y, &super::text::cut(message, room), Role::Alarm);
             }
-            None => otherwise(pen),
+            (None, Some(sensitivity)) => {
+                let line = super::sensitivity::line(sensitivity, pen.look.glyphs);
+                pen.text(1, y, &super::text::cut(&line, room), Role::Strong);
+            }
+            (None, None) => otherwise(pen),
         }
     }
 }

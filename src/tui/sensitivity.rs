@@ -1,5 +1,6 @@
 //! The slider of a device's sensitivity, the same on every screen.
 
+use super::palette::Glyphs;
 use super::text::{fixed, place};
 
 /// The slider's ends: 10^(±26/20) is about 0.05 and 20.
@@ -22,11 +23,15 @@ pub fn stepped(sensitivity: f64, more: bool) -> f64 {
 
 /// The slider as a line of text.
 #[must_use]
-pub fn line(sensitivity: f64) -> String {
+pub fn line(sensitivity: f64, glyphs: Glyphs) -> String {
     const WIDTH: u16 = 25;
     let knob = place((part(sensitivity) * f64::from(WIDTH - 1)).round());
-    let bar: String = (0..WIDTH).map(|at| if at == knob { '●' } else { '─' }).collect();
-    format!("sensitivity - ├{bar}┤ + {}", fixed(sensitivity, 5, 2))
+    let (knob_sign, rail, ends) = match glyphs {
+        Glyphs::Ascii => ('O', '-', ('|', '|')),
+        _ => ('●', '─', ('├', '┤')),
+    };
+    let bar: String = (0..WIDTH).map(|at| if at == knob { knob_sign } else { rail }).collect();
+    format!("sensitivity  - {}{bar}{} +  {}", ends.0, ends.1, fixed(sensitivity, 5, 2))
 }
 
 fn level(sensitivity: f64) -> f64 {
@@ -51,6 +56,8 @@ mod tests {
         assert_eq!(part(value), 0.0);
         assert!(value >= 0.05, "{value}");
         assert_eq!(stepped(stepped(1.0, true), false), 1.0);
-        assert!(line(1.0).contains('●') && line(1.0).ends_with("1.00"));
+        let shown = line(1.0, Glyphs::Braille);
+        assert!(shown.contains('●') && shown.ends_with("1.00"));
+        assert!(line(2.0, Glyphs::Ascii).is_ascii());
     }
 }

@@ -203,6 +203,7 @@ impl Page {
     fn forget_question(&mut self) {
         self.asked_to_end = false;
         self.ui.message = None;
+        self.ui.tuned = None;
     }
 
     fn ask(&mut self, command: Command) {
@@ -219,7 +220,7 @@ impl Page {
         };
         let turned = sensitivity::stepped(sensitivity, more);
         self.running.info.sensitivity = Some(turned);
-        self.ui.message = Some(sensitivity::line(turned));
+        self.ui.tuned = Some(turned);
         self.ask(Command::Sensitivity(turned));
     }
 
