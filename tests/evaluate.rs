@@ -196,6 +196,16 @@ fn the_rules_that_were_used_are_named() {
     assert_eq!(evaluated(&desk, "p.json")["profile"], "balance.ron (built in)");
 }
 
+/// A single start has no interval, least of all one without width.
+#[test]
+fn a_single_start_prints_no_interval() {
+    let (desk, _) = taught("balance");
+    let printed = desk.succeed("evaluate s --starts 1");
+    let tenth = printed.lines().find(|line| line.trim_start().starts_with("10 %")).unwrap();
+    assert!(!tenth.contains(" to "), "{printed}");
+    assert!(desk.succeed("evaluate s --starts 3").lines().any(|line| line.contains(" to ")));
+}
+
 #[test]
 fn random_starts_go_by_the_seed() {
     let (desk, _) = taught("balance");

@@ -417,6 +417,43 @@ fn a_duration_counts_controlled_time_of_main() {
     );
 }
 
+/// The steps of an episode that the phase's time cut are not known: the mean is without it,
+/// and says so.
+#[test]
+fn a_mean_of_steps_says_which_episodes_it_is_over() {
+    let run = "run mountain-car --headless --operator script:still.csv --phases main --duration 30 \
+               --seed 1 --logs .";
+    let desk = Desk::new();
+    std::fs::write(desk.at("still.csv"), "t,u\n0,0\n").unwrap();
+    let printed = desk.succeed(run);
+    assert!(
+        printed.contains("500 steps over 1 rollout, the flag reached in 0; 1 more cut"),
+        "{printed}"
+    );
+    let json: Value = serde_json::from_str(&desk.succeed(&format!("{run} --json"))).unwrap();
+    let main = &json["phases"]["main"];
+    assert_eq!((main["episodes"].as_u64(), main["cut"].as_u64()), (Some(2), Some(1)), "{main}");
+    assert_eq!(main["mean_steps"], 500.0);
+}
+
+/// A cut session of another preset is another experiment, so going on with it is not offered.
+#[test]
+fn only_a_cut_session_of_the_same_preset_is_offered() {
+    let desk = Desk::new();
+    let run = |profile: &str| {
+        let line = format!("run {profile} --headless --operator none --phases main --rollouts 1");
+        text(&desk.run(&line).stderr)
+    };
+    run("balance");
+    let sidecar = desk.at(SIMULTANEOUS).join("session.json");
+    let session = std::fs::read_to_string(&sidecar).unwrap();
+    let cut = session.replace("\"status\": \"complete\"", "\"status\": \"interrupted\"");
+    assert_ne!(cut, session);
+    std::fs::write(&sidecar, cut).unwrap();
+    assert!(!run("balance-modern").contains("--resume"));
+    assert!(run("balance").contains("--resume"));
+}
+
 #[test]
 fn a_taken_trial_goes_to_the_next_free_one_and_that_is_said() {
     let desk = Desk::new();

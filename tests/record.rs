@@ -290,6 +290,7 @@ fn a_session_being_recorded_is_neither_offered_nor_resumed_by_another() {
         subject: subject(),
         trial,
         task: "balance".to_owned(),
+        preset: "balance".to_owned(),
         mode: "simultaneous",
         phase: Phase::Main,
         episode: 2,

@@ -137,6 +137,7 @@ fn unfinished(subject: &str, episode: u32) -> Unfinished {
         subject: subject.parse().unwrap(),
         trial: Trial(2),
         task: "balance".to_owned(),
+        preset: "thesis".to_owned(),
         mode: "simultaneous",
         phase: Phase::Main,
         episode,

@@ -178,6 +178,8 @@ pub struct Unfinished {
     pub trial: Trial,
     /// The task's name outside.
     pub task: String,
+    /// Its preset.
+    pub preset: String,
     /// The mode's word.
     pub mode: &'static str,
     /// The phase that it goes on with.
@@ -210,7 +212,7 @@ pub fn unfinished(logs: &Path) -> Vec<Unfinished> {
 }
 
 fn standing(path: PathBuf) -> Option<(SystemTime, Unfinished)> {
-    let Sidecar { subject, trial, task, mode, status, .. } =
+    let Sidecar { subject, trial, task, preset, mode, status, .. } =
         read_sidecar(&path.join(SESSION)).ok()?;
     if status == Status::Complete || is_busy(&path) {
         return None;
@@ -219,7 +221,7 @@ fn standing(path: PathBuf) -> Option<(SystemTime, Unfinished)> {
     let Standing { moment, of } = document::read(&checkpoint).ok()?;
     let when = fs::metadata(&checkpoint).and_then(|m| m.modified()).ok()?;
     let (mode, phase, episode) = (mode.word(), moment.phase, moment.rollout);
-    Some((when, Unfinished { path, subject, trial, task, mode, phase, episode, of }))
+    Some((when, Unfinished { path, subject, trial, task, preset, mode, phase, episode, of }))
 }
 
 /// Whether a process records into the folder now.

@@ -120,6 +120,10 @@ pub enum Achieved {
         mean_reward: f64,
         /// Rollouts that reached the flag.
         solved: usize,
+        /// Rollouts that the phase's time cut: their steps are not known, so they are not in
+        /// the mean.
+        #[serde(skip_serializing_if = "is_zero")]
+        cut: usize,
     },
 }
 
@@ -160,6 +164,7 @@ impl Achieved {
                 sd_steps: sd,
                 mean_reward: mean(&rows.iter().map(|row| row.mean_reward).collect::<Vec<_>>()),
                 solved: ended(End::Goal),
+                cut: ended(End::Time),
             },
             _ => Self::Balance {
                 mean_balance_s: mean(&values),
@@ -180,13 +185,30 @@ impl Achieved {
         }
     }
 
+    /// Rollouts whose number is not known.
+    const fn cut(&self) -> usize {
+        match *self {
+            Self::MountainCar { cut, .. } => cut,
+            _ => 0,
+        }
+    }
+
     /// In a sentence, over `rollouts` of them.
     #[must_use]
     pub fn sentence(&self, rollouts: usize) -> String {
         let spread = |sd: Option<f64>, decimals: usize| {
             sd.map_or(String::new(), |sd| format!(" ± {sd:.decimals$}"))
         };
-        let over = format!("over {rollouts} rollout{}", if rollouts == 1 { "" } else { "s" });
+        // The mean is over those whose number is known.
+        let known = match rollouts.saturating_sub(self.cut()) {
+            0 => rollouts,
+            known => known,
+        };
+        let over = format!("over {known} rollout{}", if known == 1 { "" } else { "s" });
+        let cut = match self.cut() {
+            0 => String::new(),
+            cut => format!("; {cut} more cut by the time of the phase"),
+        };
         let mut line = String::new();
         // Writing to a text cannot fail.
         let _ = match *self {
@@ -212,7 +234,7 @@ impl Achieved {
             ),
             Self::MountainCar { mean_steps: Some(mean), sd_steps: sd, solved, .. } => write!(
                 line,
-                "{mean:.0}{} steps {over}, the flag reached in {solved}",
+                "{mean:.0}{} steps {over}, the flag reached in {solved}{cut}",
                 spread(sd, 0)
             ),
             Self::MountainCar { mean_steps: None, .. } => {
@@ -221,6 +243,11 @@ impl Achieved {
         };
         line
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+const fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// The number at `index` of what a task counted in a rollout.

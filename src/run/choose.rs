@@ -79,11 +79,13 @@ fn last_policy(order: &Order, profile: &Profile) -> Result<PathBuf, RunError> {
         })
 }
 
-/// That the subject's latest session of this task was cut off, and how to go on with it.
+/// That the subject's latest session of this task and preset was cut off, and how to go on
+/// with it.
 pub(super) fn cut_off_notice(order: &Order, profile: &Profile) -> Option<String> {
+    let (task, preset) = (profile.experiment.name(), &profile.preset);
     let cut = folder::unfinished(&order.logs)
         .into_iter()
-        .find(|cut| cut.subject == order.subject && cut.task == profile.experiment.name())?;
+        .find(|cut| cut.subject == order.subject && cut.task == task && cut.preset == *preset)?;
     Some(format!(
         "coadapt run --resume {} goes on with trial {}, cut at {} {}",
         cut.path.display(),

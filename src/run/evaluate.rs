@@ -219,14 +219,13 @@ impl Evaluation {
         }
         for tenth in &self.tenths {
             let mean = tenth.alone.measures.achieved.mean().unwrap_or(f64::NAN);
-            let (low, high) = tenth.alone.interval95.unwrap_or((mean, mean));
+            let interval = tenth.alone.interval95.map_or(String::new(), |(low, high)| {
+                format!("   {low:.decimals$} to {high:.decimals$}")
+            });
             let better = tenth
                 .improvement_percent
                 .map_or(String::new(), |percent| format!("   {percent:+.0} % on the first"));
-            lines.push(format!(
-                "{:>5} %  {mean:8.decimals$}   {low:.decimals$} to {high:.decimals$}{better}",
-                tenth.percent
-            ));
+            lines.push(format!("{:>5} %  {mean:8.decimals$}{interval}{better}", tenth.percent));
         }
         lines
     }
