@@ -95,7 +95,8 @@ pub enum Achieved {
         top_share: f64,
         /// The longest time without leaving the top, s,
         longest_hold_s: f64,
-        /// and the mean over the rollouts of each one's longest, s.
+        /// and the mean over the rollouts of each one's longest, s; where a session runs on, a
+        /// hold counts in each rollout that it reaches.
         mean_longest_hold_s: f64,
     },
     /// The ball was sped up.
