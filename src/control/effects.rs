@@ -309,8 +309,7 @@ impl<W: Witness> Cycle<W> {
     /// something else.
     pub(super) fn tune(&mut self, sensitivity: f64) {
         self.crew.operator.tune(sensitivity);
-        let phase = self.stage.moment().map(|moment| moment.phase);
-        self.note("sensitivity", self.stage.moment(), phase, format!("{sensitivity}"));
+        self.note("sensitivity", self.stage.moment(), None, sensitivity.to_string());
     }
 
     /// Writes down what people asked for; ticks speak through their rows.

@@ -82,8 +82,8 @@ pub struct Shaper {
     shape: Shape,
     /// The action at full deflection, in the plant's unit.
     limit: f64,
-    /// The part of the way to a new value that the filter goes in a tick.
-    gain: f64,
+    /// The part of the way to a new value that the filter leaves in a tick.
+    kept: f64,
     value: f64,
 }
 
@@ -92,13 +92,13 @@ impl Shaper {
     #[must_use]
     pub fn new(shape: Shape, limit: f64, tick: Seconds) -> Self {
         let kept = if shape.filter_s > 0.0 { (-tick.0 / shape.filter_s).exp() } else { 0.0 };
-        Self { shape, limit, gain: 1.0 - kept, value: 0.0 }
+        Self { shape, limit, kept, value: 0.0 }
     }
 
     /// The action of this tick for a deflection of `raw`.
     pub fn shape(&mut self, raw: f64) -> f64 {
         let wanted = self.shape.curve(raw);
-        let left = (1.0 - self.gain) * (self.value - wanted);
+        let left = self.kept * (self.value - wanted);
         // An idle hand comes to rest, not to ever smaller numbers.
         self.value = if left.abs() < 1e-6 { wanted } else { wanted + left };
         self.value * self.limit

@@ -62,9 +62,7 @@ impl<const N: usize> DelayLine<N> {
         let (newer, older) = (self.back(index), self.back(index + 1));
         std::array::from_fn(|i| newer[i] + (older[i] - newer[i]) * part)
     }
-}
 
-impl<const N: usize> DelayLine<N> {
     /// All that it remembers, the oldest first.
     pub(super) fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         let len = self.rows.len();
