@@ -1,12 +1,16 @@
 //! Who steers: hands on a device, a script, a simulated operator, or nobody.
 
+pub mod badge;
 mod choice;
+pub mod gamepad;
+pub mod mouse;
 pub mod script;
 pub mod shaping;
 pub mod simulated;
 pub mod terminal;
 
-pub use choice::{Choice, Params, UnknownOperator};
+pub use badge::Badge;
+pub use choice::{Choice, Device, Params, UnknownOperator, Via};
 
 use crate::random::Place;
 use crate::signal::{Action, End, Intent, Seconds, State};
@@ -35,6 +39,36 @@ pub struct Feedback<'a> {
     pub next: &'a State,
     /// The rollout's end, if it ended here.
     pub end: Option<End>,
+    /// The person's share in the applied action.
+    pub share: f64,
+}
+
+/// What a device asks for beside its deflection, with its buttons.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// Go on from an instruction, a break, a pause or a stop.
+    Begin,
+    /// Pause, or go on.
+    Pause,
+    /// Throw the rollout away and repeat it.
+    Discard,
+    /// Emergency stop.
+    Stop,
+}
+
+/// What happened to a device, in words for `events.csv` and the screen.
+#[derive(Clone, Debug, PartialEq)]
+pub enum News {
+    /// Its button asks for something.
+    Asks(Request),
+    /// It is gone: unplugged, or its relay has ended.
+    Gone(String),
+    /// It is there again.
+    Back(String),
+    /// Something else that whoever reads the data wants to know.
+    Remark(String),
+    /// It has nothing more to say, ever; a session that nobody attends ends here.
+    Over(String),
 }
 
 /// What an operator has steered before a rollout, in introduction and main together.
@@ -53,6 +87,17 @@ pub trait Operator: Send {
 
     /// From now on the device's deflection counts `sensitivity` times; nonsense is ignored.
     fn tune(&mut self, _sensitivity: f64) {}
+
+    /// What happened to the device since it was asked last, oldest first; asked at the start
+    /// of every tick, whatever the session is doing. Never blocks.
+    fn news(&mut self, _now: Seconds) -> Option<News> {
+        None
+    }
+
+    /// Whether the device is gone, so that nobody can steer before it is back.
+    fn is_gone(&self) -> bool {
+        false
+    }
 
     /// The latest wish; never blocks. Called in the countdown too, where it has no effect.
     fn intent(&mut self, view: View<'_>) -> Intent;

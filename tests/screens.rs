@@ -692,6 +692,7 @@ proptest! {
             show_progress: flags & 1 == 0,
             subject_view: flags & 2 == 0,
             help_open: flags & 4 == 0,
+            trouble: None,
             message: (flags & 8 == 0).then(|| "字".repeat(60)),
             tuned: (flags & 32 == 0).then_some(speed),
             look: Look { glyphs, ..Look::default() },

@@ -251,6 +251,7 @@ impl<W: Witness> Cycle<W> {
     fn tick(&mut self, wake: Wake, clock: &dyn Clock) {
         self.note_lateness(wake, clock);
         self.obey();
+        self.listen();
         let end = match self.stage {
             Stage::Running(moment) => self.control(moment),
             Stage::Hold { moment, ticks_left } => {
@@ -301,9 +302,14 @@ impl<W: Witness> Cycle<W> {
         }
         if moment.phase.is_steered() {
             self.rollout.absent += u32::from(!human.is_present());
-            let told =
-                Feedback { state: &state, applied: Action(applied), reward, next: &next, end };
-            self.crew.operator.told(&told);
+            self.crew.operator.told(&Feedback {
+                state: &state,
+                applied: Action(applied),
+                reward,
+                next: &next,
+                end,
+                share: share.unwrap_or(1.0),
+            });
         }
         self.rollout.total_reward += reward;
         self.rollout.tally.step(&state, &next);
@@ -342,9 +348,15 @@ impl<W: Witness> Cycle<W> {
         self.seen.applied = 0.0;
     }
 
-    fn intent(&mut self, state: &State, rollout_time: f64) -> Intent {
+    /// The time since the session's control began.
+    pub(super) fn now(&self) -> Seconds {
         #[expect(clippy::cast_precision_loss, reason = "a tick count far below 2^52")]
-        let now = Seconds(self.seen.tick.0 as f64 * self.rules.tick.0);
+        let ticks = self.seen.tick.0 as f64;
+        self.rules.tick * ticks
+    }
+
+    fn intent(&mut self, state: &State, rollout_time: f64) -> Intent {
+        let now = self.now();
         let rollout_time = Seconds(rollout_time);
         let limit = self.crew.task.action_limit();
         match self.crew.operator.intent(View { state, now, rollout_time }) {

@@ -5,7 +5,7 @@ use super::scale;
 use super::witness::{Happening, Standing, Witness};
 use crate::backend::Backend;
 use crate::learner::Learner;
-use crate::operator::Practice;
+use crate::operator::{News, Practice, Request};
 use crate::record::{EpisodeRow, Momentum, StepRow};
 use crate::session::machine::{self, Effect, Event, Stage};
 use crate::session::plan::Start;
@@ -277,6 +277,40 @@ impl<W: Witness> Cycle<W> {
             momentum: self.momentum_of(moment),
             tenths: self.mind.tenths,
         });
+    }
+
+    /// Takes what happened to the operator's device since the last tick. Without it nobody
+    /// can steer: a rollout that needs a person waits, before anything is applied.
+    pub(super) fn listen(&mut self) {
+        let now = self.now();
+        while let Some(news) = self.crew.operator.news(now) {
+            let (event, words) = match news {
+                News::Asks(request) => {
+                    self.happen(match request {
+                        Request::Begin => Event::Begin,
+                        Request::Pause => Event::Pause,
+                        Request::Discard => Event::Discard,
+                        Request::Stop => Event::Stop,
+                    });
+                    continue;
+                }
+                News::Gone(words) => ("device_gone", words),
+                News::Back(words) => ("device_back", words),
+                News::Remark(words) => ("device", words),
+                News::Over(words) if self.rules.plan.attended => ("device", words),
+                News::Over(words) => {
+                    self.cause.get_or_insert(words);
+                    self.happen(Event::Abort);
+                    continue;
+                }
+            };
+            self.note(event, self.stage.moment(), None, words);
+        }
+        let is_steered = self.stage.moment().is_some_and(|moment| moment.phase.is_steered());
+        let is_due = matches!(self.stage, Stage::Running(_) | Stage::Hold { .. });
+        if is_steered && is_due && self.crew.operator.is_gone() {
+            self.happen(Event::Pause);
+        }
     }
 
     /// A tripped limit is an emergency stop that nobody had to press.

@@ -2,6 +2,7 @@
 
 use super::witness::{Happening, Standing, Witness};
 use crate::learner::Model;
+use crate::operator::Badge;
 use crate::operator::terminal::Hands;
 use crate::record::checkpoint::Checkpoint;
 use crate::record::policy::Policy;
@@ -27,6 +28,36 @@ pub struct Origin {
     pub action_limit: f64,
 }
 
+/// The device under the person's hands, as `session.json` tells of it.
+#[derive(Clone, Debug)]
+pub struct Device {
+    /// What it says of itself.
+    pub badge: Badge,
+    /// The keys, where it is the keyboard.
+    pub hands: Option<Hands>,
+}
+
+/// Descriptions of devices that a session keeps; a plug that is loose makes no more.
+const MOST_DEVICES: usize = 16;
+
+impl Device {
+    /// Tells `sidecar` what is known now, and returns whether that was news.
+    pub fn tell(&self, sidecar: &mut Sidecar) -> bool {
+        let words = self.badge.words();
+        let devices = &mut sidecar.devices;
+        let is_new = !words.is_empty() && !devices.contains(&words);
+        if is_new && devices.len() < MOST_DEVICES {
+            devices.push(words);
+        }
+        let known = self.hands.as_ref().map(|hands| hands.knowledge().words().to_owned());
+        let is_learned = known.is_some() && known != sidecar.key_releases;
+        if is_learned {
+            sidecar.key_releases = known;
+        }
+        is_new || is_learned
+    }
+}
+
 /// Passes rows on to the recorder.
 #[derive(Debug)]
 pub struct Scribe {
@@ -35,8 +66,8 @@ pub struct Scribe {
     plan: Plan,
     /// The learners after the tenths of main, by percent.
     tenths: Vec<(u8, Model)>,
-    /// The facts of a session at the keyboard, and the hands that know of releases.
-    keyboard: Option<(Sidecar, Hands)>,
+    /// The facts of a session with a device, and what is to be known of that.
+    device: Option<(Sidecar, Device)>,
     /// Stamps happenings with the wall's time, in sessions on the wall's time.
     stamp: fn() -> String,
 }
@@ -52,19 +83,17 @@ impl Scribe {
         tenths: Vec<(u8, Model)>,
         stamp: fn() -> String,
     ) -> Self {
-        Self { recorder, origin, plan, tenths, keyboard: None, stamp }
+        Self { recorder, origin, plan, tenths, device: None, stamp }
     }
 
-    /// From now on `session.json` says how key releases are known, as soon as they are.
-    pub fn note_key_releases(&mut self, sidecar: Sidecar, hands: Hands) {
-        self.keyboard = Some((sidecar, hands));
+    /// From now on `session.json` says what `device` says of itself, as soon as it does.
+    pub fn note_device(&mut self, sidecar: Sidecar, device: Device) {
+        self.device = Some((sidecar, device));
     }
 
     fn renew_sidecar(&mut self) {
-        let Some((sidecar, hands)) = &mut self.keyboard else { return };
-        let known = hands.knowledge().words();
-        if sidecar.key_releases.as_deref() != Some(known) {
-            sidecar.key_releases = Some(known.to_owned());
+        let Some((sidecar, device)) = &mut self.device else { return };
+        if device.tell(sidecar) {
             self.recorder.sidecar(Box::new(sidecar.clone()));
         }
     }

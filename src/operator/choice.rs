@@ -6,8 +6,9 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use super::shaping::Shape;
 use super::simulated::{self, Kind, Skill};
-use super::terminal;
+use super::{gamepad, mouse, terminal};
 use crate::check::{Check, Checker};
 
 /// The operators' parameters.
@@ -16,11 +17,55 @@ use crate::check::{Check, Checker};
 pub struct Params {
     /// Hands on the keyboard.
     pub keyboard: terminal::Params,
+    /// Hands on a gamepad.
+    pub gamepad: gamepad::Params,
+    /// Hands on the mouse.
+    pub mouse: mouse::Params,
+}
+
+impl Params {
+    /// How the deflection of `device` becomes an action.
+    #[must_use]
+    pub const fn shape(&self, device: Device) -> &Shape {
+        match device {
+            Device::Keyboard => &self.keyboard.shape,
+            Device::Gamepad => &self.gamepad.shape,
+            Device::Mouse => &self.mouse.shape,
+        }
+    }
+}
+
+/// What a hand can be on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Device {
+    /// The arrows and their like.
+    Keyboard,
+    /// A gamepad or joystick.
+    Gamepad,
+    /// The terminal's mouse.
+    Mouse,
+}
+
+impl Device {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Keyboard, Self::Gamepad, Self::Mouse];
+
+    /// Its name, on the command line and as the profile's section.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Keyboard => "keyboard",
+            Self::Gamepad => "gamepad",
+            Self::Mouse => "mouse",
+        }
+    }
 }
 
 impl Check for Params {
     fn check(&self, c: &mut Checker<'_>) {
         self.keyboard.check(&mut c.section("keyboard"));
+        self.gamepad.check(&mut c.section("gamepad"));
+        self.mouse.check(&mut c.section("mouse"));
     }
 }
 
@@ -31,6 +76,10 @@ pub enum Choice {
     /// Hands on the keyboard.
     #[default]
     Keyboard,
+    /// Hands on a gamepad.
+    Gamepad(Via),
+    /// Hands on the mouse.
+    Mouse,
     /// The table in a file, or what was done in a recorded session.
     Script(PathBuf),
     /// A model of a person.
@@ -39,12 +88,38 @@ pub enum Choice {
     None,
 }
 
+/// Where a gamepad's events come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Via {
+    /// A pad at this computer.
+    Here,
+    /// Lines of `coadapt pad-relay` on standard input.
+    RelayInput,
+    /// The same from whoever connects to the Unix socket at this path.
+    RelaySocket(PathBuf),
+    /// A table of events in a file, in the session's time.
+    Script(PathBuf),
+}
+
+impl Choice {
+    /// The device under the person's hands, if there is one.
+    #[must_use]
+    pub const fn device(&self) -> Option<Device> {
+        match self {
+            Self::Keyboard => Some(Device::Keyboard),
+            Self::Gamepad(_) => Some(Device::Gamepad),
+            Self::Mouse => Some(Device::Mouse),
+            Self::Script(_) | Self::Simulated(..) | Self::None => None,
+        }
+    }
+}
+
 /// Words that choose no operator.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnknownOperator {
     /// No such operator.
     #[error(
-        "`{0}` is no operator; choose keyboard, script:FILE (a table, or a session's folder), simulated:SKILL[:TYPE] or none"
+        "`{0}` is no operator; choose keyboard, gamepad (or gamepad:relay=-, gamepad:relay=unix:PATH, gamepad:script=FILE), mouse, script:FILE (a table, or a session's folder), simulated:SKILL[:TYPE] or none"
     )]
     Operator(String),
     /// No such skill or type.
@@ -59,6 +134,21 @@ impl FromStr for Choice {
         match words.split_once(':') {
             None if words == "keyboard" => Ok(Self::Keyboard),
             None if words == "none" => Ok(Self::None),
+            None if words == "gamepad" => Ok(Self::Gamepad(Via::Here)),
+            None if words == "mouse" => Ok(Self::Mouse),
+            Some(("gamepad", via)) => match via.split_once('=') {
+                Some(("relay", "-")) => Ok(Self::Gamepad(Via::RelayInput)),
+                Some(("relay", path)) => match path.strip_prefix("unix:") {
+                    Some(path) if !path.is_empty() => {
+                        Ok(Self::Gamepad(Via::RelaySocket(path.into())))
+                    }
+                    _ => Err(UnknownOperator::Operator(words.to_owned())),
+                },
+                Some(("script", file)) if !file.is_empty() => {
+                    Ok(Self::Gamepad(Via::Script(file.into())))
+                }
+                _ => Err(UnknownOperator::Operator(words.to_owned())),
+            },
             Some(("script", file)) if !file.is_empty() => Ok(Self::Script(file.into())),
             Some(("simulated", model)) => {
                 let (skill, kind) = match model.split_once(':') {
@@ -76,6 +166,13 @@ impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Keyboard => f.write_str("keyboard"),
+            Self::Gamepad(Via::Here) => f.write_str("gamepad"),
+            Self::Gamepad(Via::RelayInput) => f.write_str("gamepad:relay=-"),
+            Self::Gamepad(Via::RelaySocket(path)) => {
+                write!(f, "gamepad:relay=unix:{}", path.display())
+            }
+            Self::Gamepad(Via::Script(file)) => write!(f, "gamepad:script={}", file.display()),
+            Self::Mouse => f.write_str("mouse"),
             Self::Script(file) => write!(f, "script:{}", file.display()),
             Self::Simulated(skill, kind) if *kind == Kind::default() => {
                 write!(f, "simulated:{skill}")
@@ -106,14 +203,34 @@ mod tests {
 
     #[test]
     fn choices_read_back_and_wrong_words_list_them() {
-        for words in ["keyboard", "none", "script:a:b.csv", "simulated:naive:lapses"] {
+        for words in [
+            "keyboard",
+            "none",
+            "script:a:b.csv",
+            "simulated:naive:lapses",
+            "gamepad",
+            "gamepad:relay=-",
+            "gamepad:relay=unix:/run/pad=1",
+            "gamepad:script=events.csv",
+            "mouse",
+        ] {
             assert_eq!(words.parse::<Choice>().unwrap().to_string(), words);
         }
         assert_eq!(
             "simulated:expert".parse(),
             Ok(Choice::Simulated(Skill::Expert, Kind::DelayedPd))
         );
-        for words in ["gamepad", "script:", "script", "simulated", "", "mouse"] {
+        for words in [
+            "gamepad:",
+            "gamepad:relay=",
+            "gamepad:relay=unix:",
+            "gamepad:relay=tcp",
+            "script:",
+            "script",
+            "simulated",
+            "",
+            "mouse:1",
+        ] {
             let message = words.parse::<Choice>().unwrap_err().to_string();
             assert!(message.contains("script:FILE"), "{message}");
         }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub use hold::{Direction, Hold, KeyReleases, Timing};
 
 use super::shaping::{Shape, Shaper};
-use super::{Operator, Practice, View};
+use super::{Badge, News, Operator, Practice, View};
 use crate::check::{Check, Checker};
 use crate::clock::{Clock, WallClock};
 use crate::random::Place;
@@ -180,6 +180,9 @@ pub struct Keyboard {
     clock: WallClock,
     push: f64,
     shaper: Shaper,
+    badge: Badge,
+    /// How releases are known, as far as the badge says it.
+    told: Option<KeyReleases>,
 }
 
 impl Keyboard {
@@ -188,13 +191,36 @@ impl Keyboard {
     #[must_use]
     pub fn new(hands: Hands, clock: WallClock, params: &Params, limit: f64, tick: Seconds) -> Self {
         let shaper = Shaper::new(params.shape, limit, tick);
-        Self { hands, clock, push: params.push, shaper }
+        let badge = Badge::default();
+        let mut keyboard = Self { hands, clock, push: params.push, shaper, badge, told: None };
+        keyboard.tell();
+        keyboard
+    }
+
+    /// What the keyboard says of itself.
+    #[must_use]
+    pub fn badge(&self) -> Badge {
+        self.badge.clone()
+    }
+
+    /// Says how releases are known, if that is new.
+    fn tell(&mut self) {
+        let known = self.hands.knowledge();
+        if self.told != Some(known) {
+            self.told = Some(known);
+            self.badge.say(format!("keyboard, releases {}", known.words()));
+        }
     }
 }
 
 impl Operator for Keyboard {
     /// A key that is held through the countdown goes on pushing.
     fn begin(&mut self, _place: Place, _practice: Practice) {}
+
+    fn news(&mut self, _now: Seconds) -> Option<News> {
+        self.tell();
+        None
+    }
 
     fn intent(&mut self, _view: View<'_>) -> Intent {
         let now = self.clock.now();

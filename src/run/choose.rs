@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::RunError;
 use super::session::{Company, Keys, usage};
+use crate::control::scribe::Device;
 use crate::learner::{Learner, Model};
 use crate::operator::script::{Recorded, Script};
 use crate::operator::simulated::{self, Kind, Skill};
@@ -105,41 +106,59 @@ pub(super) fn assigned_mode(order: &Order, profile: &Profile, seed: u64) -> Mode
     })
 }
 
+/// Who steers, and the device under their hands, if there is one.
+pub(super) struct Hand {
+    pub(super) operator: Box<dyn Operator>,
+    pub(super) device: Option<Device>,
+}
+
+impl<O: Operator + 'static> From<O> for Hand {
+    fn from(operator: O) -> Self {
+        Self { operator: Box::new(operator), device: None }
+    }
+}
+
 /// The operator that `choice` names.
 pub(super) fn steer(
     choice: &Choice,
     profile: &Profile,
     seed: u64,
     company: &Company,
-) -> Result<Box<dyn Operator>, RunError> {
+) -> Result<Hand, RunError> {
     let tick = profile.tick();
     let limit = profile.experiment.task(tick).action_limit();
     let params = &profile.operator;
     Ok(match choice {
-        Choice::None => Box::new(operator::Nobody),
-        Choice::Script(folder) if folder.is_dir() => Box::new(recorded(folder, profile, limit)?),
+        Choice::None => operator::Nobody.into(),
+        Choice::Script(folder) if folder.is_dir() => recorded(folder, profile, limit)?.into(),
         Choice::Script(file) => {
             let phases = [Phase::Introduction, Phase::Main]
                 .map(|phase| (phase.word(), Moment::start_of(phase).place().phase));
-            Box::new(Script::load(file, &phases, limit).map_err(|error| usage(&error))?)
+            Script::load(file, &phases, limit).map_err(|error| usage(&error))?.into()
         }
         Choice::Simulated(skill, kind) => {
-            simulated_operator(&profile.experiment, (*skill, *kind), seed, tick)
+            let operator = simulated_operator(&profile.experiment, (*skill, *kind), seed, tick);
+            Hand { operator, device: None }
         }
-        Choice::Keyboard => match company {
-            Company::Attended(Keys { hands, clock }) => {
-                Box::new(Keyboard::new(hands.clone(), *clock, &params.keyboard, limit, tick))
-            }
-            Company::Headless => {
-                return Err(RunError::Usage(
-                    "a headless session has no keyboard: give --operator simulated:average, \
-                     script:FILE or none; a session that was begun at the keyboard is resumed \
-                     without --headless"
-                        .to_owned(),
-                ));
-            }
-        },
+        Choice::Gamepad(_) | Choice::Mouse => return Err(RunError::Usage(String::new())),
+        Choice::Keyboard => {
+            let Keys { hands, clock } = attended(company, "keyboard")?;
+            let keyboard = Keyboard::new(hands.clone(), *clock, &params.keyboard, limit, tick);
+            let device = Device { badge: keyboard.badge(), hands: Some(hands.clone()) };
+            Hand { operator: Box::new(keyboard), device: Some(device) }
+        }
     })
+}
+
+/// The keys and the clock of a session with a person at `device`.
+fn attended<'a>(company: &'a Company, device: &str) -> Result<&'a Keys, RunError> {
+    match company {
+        Company::Attended(keys) => Ok(keys),
+        Company::Headless => Err(RunError::Usage(format!(
+            "a headless session has no {device}: give --operator simulated:average, script:FILE \
+             or none; a session that was begun at the {device} is resumed without --headless"
+        ))),
+    }
 }
 
 /// What the person did in the session in `folder`, to be done once more.

@@ -8,13 +8,14 @@ use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use super::outcome::Finished;
-use super::session::{Company, KEYBOARD, Keys, Session};
+use super::session::{Company, Keys, Session};
 use super::shutdown::Shutdown;
 use super::{RunError, exit_code, sentences, signal_code, tell};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::cli;
 use crate::clock::WallClock;
+use crate::operator::Choice;
 use crate::operator::terminal::{self, Hands};
 use crate::profile::{self, Document, Order, ProfileError};
 use crate::record::folder;
@@ -163,6 +164,7 @@ impl Stage {
             info: info(&session),
             watcher: session.watcher.clone(),
             frames: session.frames.clone(),
+            badge: session.device.as_ref().map(|device| device.badge.clone()),
             screen: session.profile().screen.clone(),
             // The next session has a number and chance of its own.
             order: Order { trial: None, seed: None, ..order },
@@ -285,8 +287,12 @@ fn info(session: &Session) -> Info {
         regions: scene::regions_of(&profile.experiment),
         field_cap: profile.learner.max_fields,
         operator: sidecar.operator.clone(),
-        sensitivity: (sidecar.operator == KEYBOARD)
-            .then_some(profile.operator.keyboard.shape.sensitivity),
+        sensitivity: sidecar
+            .operator
+            .parse::<Choice>()
+            .ok()
+            .and_then(|choice| choice.device())
+            .map(|device| profile.operator.shape(device).sensitivity),
     }
 }
 

@@ -8,16 +8,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use serde::Serialize;
 
 use super::RunError;
-use super::choose::{assigned_mode, cut_off_notice, order_policy, steer};
+use super::choose::{Hand, assigned_mode, cut_off_notice, order_policy, steer};
 use super::outcome::{Finished, conclude};
 use crate::clock::{self, Clock, WallClock};
 use crate::control::cycle::{Crew, Cycle, Rules};
-use crate::control::scribe::{Origin, Scribe, standing_of};
+use crate::control::scribe::{Device, Origin, Scribe, standing_of};
 use crate::control::snapshot::{Watcher, channel};
 use crate::control::witness::Standing;
 use crate::learner::Model;
 use crate::operator::terminal::Hands;
-use crate::operator::{self, Choice, Operator};
+use crate::operator::{self, Choice};
 use crate::profile::{Document, Order, Profile};
 use crate::random::draw_seed;
 use crate::record::sidecar::Host;
@@ -27,8 +27,6 @@ use crate::session::plan::Plan;
 use crate::session::{Moment, Phase, Trial};
 use crate::study::evaluate::simulated_backend;
 
-/// The word of the operator at the keyboard.
-pub(super) const KEYBOARD: &str = "keyboard";
 /// The largest number that a person may give a trial.
 const MOST_TRIALS: u32 = 999_999;
 
@@ -48,7 +46,7 @@ pub struct Session {
     pub(super) profile: Profile,
     pub(super) sidecar: Sidecar,
     pub(super) folder: PathBuf,
-    pub(super) keys: Option<Keys>,
+    pub(super) device: Option<Device>,
     /// Frames drawn so far, counted by the screen.
     pub frames: Arc<AtomicU64>,
     /// Looks at the session and asks things of it.
@@ -82,13 +80,6 @@ impl Company {
         match self {
             Self::Headless => String::new,
             Self::Attended(_) => clock::timestamp,
-        }
-    }
-
-    fn keys(self) -> Option<Keys> {
-        match self {
-            Self::Headless => None,
-            Self::Attended(keys) => Some(keys),
         }
     }
 }
@@ -296,11 +287,10 @@ impl Session {
         signal: impl Fn() -> Option<i32>,
     ) -> Result<Finished, RunError> {
         let outcome = self.cycle.run(clock);
-        let key_releases = self.keys.as_ref().map(|k| k.hands.knowledge().words().to_owned());
-        let sidecar = Sidecar {
-            key_releases: key_releases.filter(|_| self.sidecar.operator == KEYBOARD),
-            ..self.sidecar
-        };
+        let mut sidecar = self.sidecar;
+        if let Some(device) = &self.device {
+            device.tell(&mut sidecar);
+        }
         let frames = self.frames.load(Ordering::Relaxed);
         conclude(&self.profile, sidecar, self.folder, outcome, frames, signal)
     }
@@ -313,7 +303,7 @@ struct Parts {
     folder: PathBuf,
     plan: Plan,
     fresh: Model,
-    hand: Box<dyn Operator>,
+    hand: Hand,
     recorder: Recorder<Model>,
 }
 
@@ -338,10 +328,8 @@ impl Parts {
             action_limit: task.action_limit(),
         };
         let mut scribe = Scribe::new(recorder, origin, plan.clone(), tenths, company.stamp());
-        if let Company::Attended(keys) = &company
-            && sidecar.operator == KEYBOARD
-        {
-            scribe.note_key_releases(sidecar.clone(), keys.hands.clone());
+        if let Some(device) = &hand.device {
+            scribe.note_device(sidecar.clone(), device.clone());
         }
         let (publisher, watcher) =
             channel(Stage::Instruction(Moment::start_of(Phase::Introduction)));
@@ -356,14 +344,14 @@ impl Parts {
         let crew = Crew {
             task,
             backend: simulated_backend(&profile, sidecar.seed),
-            operator: hand,
+            operator: hand.operator,
             witness: scribe,
             publisher: Some(publisher),
         };
         let cycle = Cycle::new(rules, crew, learner, from);
-        let keys = company.keys();
         let frames = Arc::default();
-        Session { cycle, profile, sidecar, folder, keys, frames, watcher, notices }
+        let device = hand.device;
+        Session { cycle, profile, sidecar, folder, device, frames, watcher, notices }
     }
 }
 

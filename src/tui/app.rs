@@ -14,6 +14,7 @@ use ratatui::crossterm::event::Event;
 use super::terminal::{Heard, Screen};
 use super::{live, results, setup};
 use crate::control::snapshot::Watcher;
+use crate::operator::Badge;
 use crate::profile::{self, Document, Order, ProfileError};
 
 /// A session that was started.
@@ -24,6 +25,8 @@ pub struct Running {
     pub watcher: Watcher,
     /// Counts the frames drawn.
     pub frames: Arc<AtomicU64>,
+    /// What the person's device says of itself, where there is one.
+    pub badge: Option<Badge>,
     /// What the profile says about the screen.
     pub screen: profile::Screen,
     /// What the set-up shows after it: the same choices, the next trial.

@@ -124,6 +124,8 @@ pub struct Ui {
     pub help_open: bool,
     /// A word to the person, in place of the line of keys.
     pub message: Option<String>,
+    /// What is wrong with the person's device and what to do, in the same place.
+    pub trouble: Option<String>,
     /// The sensitivity that was just turned, in the same place.
     pub tuned: Option<f64>,
     /// Glyphs and colours.
@@ -137,6 +139,7 @@ impl Default for Ui {
             subject_view: false,
             help_open: false,
             message: None,
+            trouble: None,
             tuned: None,
             look: Look::default(),
         }
@@ -218,7 +221,7 @@ impl View<'_> {
         otherwise: impl FnOnce(&mut Pen<'_>),
     ) {
         let room = usize::from(pen.width().saturating_sub(2));
-        match (&self.ui.message, self.ui.tuned) {
+        match (self.ui.message.as_ref().or(self.ui.trouble.as_ref()), self.ui.tuned) {
             (Some(message), _) => {
                 pen.text(1, y, &super::text::cut(message, room), Role::Alarm);
             }

@@ -122,9 +122,9 @@ impl Page {
         if !is_same_page(self.panel.stage, scene.stage) {
             self.panel = scene;
         }
-        let known = screen.feed().hands().knowledge().words();
-        if self.running.info.operator.starts_with("keyboard") {
-            self.running.info.operator = format!("keyboard, releases {known}");
+        if let Some(badge) = &self.running.badge {
+            self.running.info.operator = badge.words_now();
+            self.ui.trouble = badge.trouble();
         }
         let view = View {
             info: &self.running.info,

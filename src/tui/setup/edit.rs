@@ -6,8 +6,8 @@ use serde::Serialize;
 use tui_input::Input;
 
 use super::{Field, Setup, without_sets};
-use crate::operator::Choice;
 use crate::operator::simulated::{Kind, Skill};
+use crate::operator::{Choice, Device};
 use crate::profile::{Document, Experiment, Fault, Order, Profile, WantedMode};
 use crate::session::Subject;
 use crate::session::plan::Wanted;
@@ -15,7 +15,6 @@ use crate::tui::sensitivity;
 
 /// The key of the pole's length.
 pub(super) const POLE_LENGTH: &str = "plant.pole_length_m";
-pub(super) const SENSITIVITY: &str = "operator.keyboard.shape.sensitivity";
 const PHASES: &str = "session.phases";
 const PRACTICE_ROLLOUTS: &str = "session.introduction_rollouts";
 const PRACTICE_DURATION: &str = "session.introduction_duration_s";
@@ -67,7 +66,7 @@ impl Drafts {
         match choice {
             Choice::Simulated(skill, kind) => drafts.model = (skill, kind),
             Choice::Script(file) => drafts.script = Input::new(file.display().to_string()),
-            Choice::Keyboard | Choice::None => {}
+            Choice::Keyboard | Choice::Gamepad(_) | Choice::Mouse | Choice::None => {}
         }
         drafts.show_profile(profile);
         drafts
@@ -268,11 +267,21 @@ impl Setup {
     /// The operator's first word.
     pub(super) fn operator_word(&self) -> &'static str {
         match self.operator() {
-            Choice::Keyboard => "keyboard",
             Choice::Simulated(..) => "simulated",
             Choice::Script(_) => "script",
             Choice::None => "none",
+            hand => hand.device().unwrap_or(Device::Keyboard).word(),
         }
+    }
+
+    /// The device whose sensitivity is shown: the person's, or the keyboard in reserve.
+    pub(super) fn device(&self) -> Device {
+        self.operator().device().unwrap_or(Device::Keyboard)
+    }
+
+    /// The sensitivity of that device.
+    pub(super) fn sensitivity(&self) -> f64 {
+        self.profile.operator.shape(self.device()).sensitivity
     }
 
     fn choose_operator(&mut self, word: &str) {
@@ -285,9 +294,8 @@ impl Setup {
     }
 
     fn change_sensitivity(&mut self, forward: bool) {
-        let sensitivity = self.profile.operator.keyboard.shape.sensitivity;
-        let value = sensitivity::stepped(sensitivity, forward);
-        self.change(SENSITIVITY, &format!("{value:?}"));
+        let value = sensitivity::stepped(self.sensitivity(), forward);
+        self.change(&sensitivity_key(self.device()), &format!("{value:?}"));
     }
 
     /// More or less of a number, in steps that a person would take.
@@ -400,6 +408,11 @@ pub(super) fn pole_length(profile: &Profile) -> Option<f64> {
     }
 }
 
+/// The profile's key of the sensitivity of `device`.
+pub(super) fn sensitivity_key(device: Device) -> String {
+    format!("operator.{}.shape.sensitivity", device.word())
+}
+
 fn length_words(length_m: f64) -> String {
     format!("{:?}", (length_m * 1e6).round() / 1e6)
 }
@@ -408,7 +421,7 @@ const MODES: [WantedMode; 3] =
     [WantedMode::Simultaneous, WantedMode::Sequential, WantedMode::Assigned];
 /// The words of the learners, as profiles spell them.
 const LEARNERS: [&str; 2] = ["rfwr", "lwpr"];
-const OPERATORS: [&str; 4] = ["keyboard", "simulated", "script", "none"];
+const OPERATORS: [&str; 6] = ["keyboard", "gamepad", "mouse", "simulated", "script", "none"];
 
 /// The one of `all` after `current`, or before it, all around.
 pub(super) fn next<T: Clone + PartialEq>(all: &[T], current: &T, forward: bool) -> T {

@@ -1,7 +1,8 @@
 //! The fields of the form, in the order in which Tab visits them.
 
+use super::edit::sensitivity_key;
 use super::{Setup, Shelf};
-use crate::operator::Choice;
+use crate::operator::{Choice, Device};
 use crate::profile::Experiment;
 use crate::session::plan::Wanted;
 
@@ -108,8 +109,10 @@ impl Field {
             | "session.introduction_duration_s" => Some(Self::Introduction),
             "session.main_rollouts" | "session.main_duration_s" => Some(Self::Main),
             "session.autonomous_rollouts" => Some(Self::Autonomous),
-            super::edit::SENSITIVITY => Some(Self::Sensitivity),
             super::edit::POLE_LENGTH => Some(Self::Pole),
+            key if Device::ALL.map(sensitivity_key).iter().any(|known| known == key) => {
+                Some(Self::Sensitivity)
+            }
             _ => None,
         }
     }

@@ -7,6 +7,7 @@ use super::lines::{Light, Signs, choice, command, input, note, push, slider, tic
 use super::prompt::Prompt;
 use super::{Field, Setup, Shelf};
 use crate::operator::Choice;
+use crate::operator::mouse::Steer;
 use crate::profile::{Experiment, WantedMode};
 use crate::session::plan::Wanted;
 use crate::tui::keys::Screen;
@@ -222,6 +223,14 @@ impl View<'_> {
                 let about = format!("key releases {}", self.extras.key_releases);
                 note(pen, ABOUT, 11, FORM, &about, Role::Dim);
             }
+            Choice::Gamepad(_) => {
+                let about = "plug it in; coadapt devices shows and maps it";
+                note(pen, ABOUT, 11, FORM, about, Role::Dim);
+            }
+            Choice::Mouse => {
+                let about = mouse_words(setup.profile.operator.mouse.steer);
+                note(pen, ABOUT, 11, FORM, about, Role::Dim);
+            }
             Choice::Simulated(skill, kind) => {
                 choice(pen, ABOUT, 11, skill.word(), self.light(Field::Skill));
                 choice(pen, BESIDE, 11, kind.word(), self.light(Field::Kind));
@@ -263,7 +272,7 @@ impl View<'_> {
     fn how(&self, pen: &mut Pen<'_>) {
         let setup = self.setup;
         self.label(pen, 12, "sensitivity", &[Field::Sensitivity]);
-        let sensitivity = setup.profile.operator.keyboard.shape.sensitivity;
+        let sensitivity = setup.sensitivity();
         slider(
             pen,
             (VALUE, 12, 27),
@@ -475,5 +484,13 @@ fn say(pen: &mut Pen<'_>, y: u16, message: &str, role: Role) {
     note(pen, LABEL, y, LABEL + width, first, role);
     if !rest.is_empty() {
         note(pen, LABEL, y + 1, LABEL + width, &rest.join(" "), role);
+    }
+}
+
+/// How the mouse steers, in a line.
+const fn mouse_words(steer: Steer) -> &'static str {
+    match steer {
+        Steer::Velocity => "the pointer's velocity is the force",
+        Steer::Position => "the plant is drawn to the pointer's place",
     }
 }

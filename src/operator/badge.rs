@@ -1,0 +1,67 @@
+//! What a device says of itself, for the screen and for `session.json`.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A sign that the operator writes and others read; clones are the same sign.
+#[derive(Clone, Debug, Default)]
+pub struct Badge(Arc<Mutex<Signs>>);
+
+#[derive(Debug, Default)]
+struct Signs {
+    words: String,
+    state: String,
+    trouble: Option<String>,
+}
+
+impl Badge {
+    /// A badge that reads `words`.
+    #[must_use]
+    pub fn new(words: impl Into<String>) -> Self {
+        let badge = Self::default();
+        badge.say(words);
+        badge
+    }
+
+    /// From now on says `words`: which device it is, and how it is known.
+    pub fn say(&self, words: impl Into<String>) {
+        self.signs().words = words.into();
+    }
+
+    /// Says how the device does at the moment, such as how old its last line is.
+    pub fn set_state(&self, state: impl Into<String>) {
+        self.signs().state = state.into();
+    }
+
+    /// Says what is wrong and what to do about it, or that all is well.
+    pub fn set_trouble(&self, trouble: Option<String>) {
+        self.signs().trouble = trouble;
+    }
+
+    /// Which device it is, and how it is known.
+    #[must_use]
+    pub fn words(&self) -> String {
+        self.signs().words.clone()
+    }
+
+    /// The same, and how the device does at the moment.
+    #[must_use]
+    pub fn words_now(&self) -> String {
+        let signs = self.signs();
+        if signs.state.is_empty() {
+            signs.words.clone()
+        } else {
+            format!("{}, {}", signs.words, signs.state)
+        }
+    }
+
+    /// What is wrong and what to do about it; `None` while all is well.
+    #[must_use]
+    pub fn trouble(&self) -> Option<String> {
+        self.signs().trouble.clone()
+    }
+
+    /// The signs stay whole even if a thread died holding them.
+    fn signs(&self) -> MutexGuard<'_, Signs> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
