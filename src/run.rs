@@ -4,6 +4,7 @@ mod choose;
 mod evaluate;
 mod fit;
 pub mod outcome;
+mod pad_relay;
 mod screen;
 pub mod session;
 mod shutdown;
@@ -66,6 +67,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Evaluate(words)) => evaluate::evaluate(words),
         Some(Command::Fit(words)) => fit::fit(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
+        Some(Command::PadRelay(words)) => pad_relay::pad_relay(words),
         Some(Command::Profile(profile)) => words::profile(profile),
     }
 }

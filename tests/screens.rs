@@ -62,6 +62,7 @@ fn info() -> Info {
         regions: None,
         field_cap: 100,
         operator: "keyboard, releases reported".to_owned(),
+        device_state: String::new(),
         sensitivity: Some(1.0),
     }
 }

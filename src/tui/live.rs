@@ -72,6 +72,8 @@ pub struct Info {
     pub field_cap: u32,
     /// The operator and how it is known, such as "keyboard, releases reported".
     pub operator: String,
+    /// How the operator's device does at the moment, in a few words; mostly none.
+    pub device_state: String,
     /// The sensitivity of the operator's device; `None` where there is no device.
     pub sensitivity: Option<f64>,
 }

@@ -123,7 +123,12 @@ impl Page {
             self.panel = scene;
         }
         if let Some(badge) = &self.running.badge {
-            self.running.info.operator = badge.words_now();
+            // A pad that is gone has no words: then the operator's own stay.
+            let words = badge.words();
+            if !words.is_empty() {
+                self.running.info.operator = words;
+            }
+            self.running.info.device_state = badge.state();
             self.ui.trouble = badge.trouble();
         }
         let view = View {
