@@ -13,7 +13,7 @@ use crate::operator::gamepad::events::Events;
 use crate::operator::gamepad::hub::{Heard, Hub};
 use crate::operator::gamepad::relay::{HEARTBEAT, Outlet};
 use crate::operator::gamepad::{Event, Pads, Params};
-use crate::operator::{News, socket_path};
+use crate::operator::socket_path;
 use crate::random::draw_seed;
 use crate::signal::Seconds;
 
@@ -48,6 +48,11 @@ fn relay(mut feed: Feed, mut clock: WallClock, mut outlet: Outlet) -> Result<Exi
     loop {
         match feed.next(&mut clock, due) {
             Next::Event(event) => {
+                match &event {
+                    Event::Connected(about) => tell(&format!("{} is plugged in", about.name)),
+                    Event::Disconnected(_) => tell("a gamepad was unplugged"),
+                    Event::Axis { .. } | Event::Button { .. } => {}
+                }
                 let now = clock.now();
                 let patience =
                     if matches!(event, Event::Axis { .. }) { BURST } else { Seconds(0.0) };
@@ -71,13 +76,6 @@ fn relay(mut feed: Feed, mut clock: WallClock, mut outlet: Outlet) -> Result<Exi
                 due = now + HEARTBEAT;
             }
             Next::Over => return Ok(ExitCode::SUCCESS),
-        }
-        while let Some(news) = pads.next_news() {
-            match news {
-                News::Gone(words) | News::Back(words) | News::Remark(words) => tell(&words),
-                // What buttons mean is for the session's profile to say.
-                News::Asks(_) => {}
-            }
         }
     }
 }

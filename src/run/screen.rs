@@ -264,6 +264,7 @@ fn info(session: &Session) -> Info {
     let (profile, sidecar) = (session.profile(), session.sidecar());
     let task = profile.experiment.task(profile.tick());
     let plan = Plan::new(&profile.session, profile.tick(), sidecar.seed, true);
+    let device = sidecar.operator.parse().ok().and_then(|choice: Choice| choice.device());
     let texts = &profile.session.instructions;
     let main = match sidecar.mode {
         Mode::Simultaneous => &texts.simultaneous,
@@ -302,12 +303,8 @@ fn info(session: &Session) -> Info {
         field_cap: profile.learner.max_fields,
         operator: sidecar.operator.clone(),
         device_state: String::new(),
-        sensitivity: sidecar
-            .operator
-            .parse::<Choice>()
-            .ok()
-            .and_then(|choice| choice.device())
-            .map(|device| profile.operator.shape(device).sensitivity),
+        device,
+        sensitivity: device.map_or(1.0, |device| profile.operator.shape(device).sensitivity),
     }
 }
 

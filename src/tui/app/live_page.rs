@@ -219,12 +219,12 @@ impl Page {
     /// Turns the sensitivity of the person's device, and shows where it stands until the
     /// next key.
     fn tune(&mut self, more: bool) {
-        let Some(sensitivity) = self.running.info.sensitivity else {
+        if self.running.info.device.is_none() {
             self.ui.message = Some("nobody's device steers: no sensitivity to turn".to_owned());
             return;
-        };
-        let turned = sensitivity::stepped(sensitivity, more);
-        self.running.info.sensitivity = Some(turned);
+        }
+        let turned = sensitivity::stepped(self.running.info.sensitivity, more);
+        self.running.info.sensitivity = turned;
         self.ui.tuned = Some(turned);
         self.ask(Command::Sensitivity(turned));
     }
