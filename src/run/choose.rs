@@ -6,6 +6,7 @@ use super::RunError;
 use super::session::{Company, Keys, usage};
 use crate::control::scribe::Device;
 use crate::learner::{Learner, Model};
+use crate::operator::mouse::Mouse;
 use crate::operator::script::{Recorded, Script};
 use crate::operator::simulated::{self, Kind, Skill};
 use crate::operator::terminal::Keyboard;
@@ -140,9 +141,15 @@ pub(super) fn steer(
             let operator = simulated_operator(&profile.experiment, (*skill, *kind), seed, tick);
             Hand { operator, device: None }
         }
-        Choice::Gamepad(_) | Choice::Mouse => return Err(RunError::Usage(String::new())),
+        Choice::Gamepad(_) => return Err(RunError::Usage(String::new())),
+        Choice::Mouse => {
+            let Keys { pointer, clock, .. } = attended(company, "mouse")?;
+            let mouse = Mouse::new(pointer.clone(), *clock, &params.mouse, limit, tick);
+            let device = Device { badge: mouse.badge(), hands: None };
+            Hand { operator: Box::new(mouse), device: Some(device) }
+        }
         Choice::Keyboard => {
-            let Keys { hands, clock } = attended(company, "keyboard")?;
+            let Keys { hands, clock, .. } = attended(company, "keyboard")?;
             let keyboard = Keyboard::new(hands.clone(), *clock, &params.keyboard, limit, tick);
             let device = Device { badge: keyboard.badge(), hands: Some(hands.clone()) };
             Hand { operator: Box::new(keyboard), device: Some(device) }

@@ -133,6 +133,7 @@ impl Page {
             history: &self.history,
             ui: &self.ui,
         };
+        screen.keep_mouse(self.running.mouse);
         if screen.draw(|frame| live::draw(frame, &view)).is_err() {
             self.leave(End::Lost);
         }
