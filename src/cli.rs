@@ -65,7 +65,7 @@ pub struct Run {
     /// rfwr or lwpr.
     #[arg(long, value_name = "LEARNER")]
     pub learner: Option<String>,
-    /// `keyboard`, `script:FILE|SESSION`, `simulated:naive|average|expert[:TYPE]` or `none`.
+    /// `keyboard`, `mouse`, `script:FILE|SESSION`, `simulated:naive|average|expert[:TYPE]` or `none`.
     #[arg(long, value_name = "OPERATOR", default_value = "keyboard")]
     pub operator: String,
     /// simulated.

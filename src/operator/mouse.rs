@@ -28,6 +28,17 @@ pub enum Steer {
     Position,
 }
 
+impl Steer {
+    /// What it does, in words for the person.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Velocity => "the pointer's velocity is the force",
+            Self::Position => "the plant is drawn to the pointer's place",
+        }
+    }
+}
+
 /// Along which side of the screen the pointer is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
