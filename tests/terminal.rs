@@ -270,6 +270,12 @@ fn the_mouse_is_tried_before_a_session_and_only_then_read() {
 #[test]
 fn within_tmux_the_keyboard_says_what_it_costs() {
     let variables = vec![("TMUX", "/tmp/tmux-0/default,1,0"), ("TERM", "tmux-256color")];
+    let mut form = Seat { variables: variables.clone(), ..Seat::default() }.open("");
+    form.shows("key releases up to 120 ms late inside tmux");
+    form.keys("t");
+    form.shows("hold the arrows; releases up to 120 ms late inside tmux");
+    form.keys("\x03");
+    assert_eq!(form.code(), 0);
     let mut terminal = Seat { variables, columns: 120, rows: 40, ..Seat::default() }.open(CALM);
     terminal.shows("Enter   begin");
     terminal.shows("inside tmux, up to 120 ms late");
