@@ -239,8 +239,8 @@ fn the_mouse_is_given_back_on_every_way_out() {
 #[test]
 fn a_flood_of_movements_drowns_no_key() {
     let mut terminal = moused(Answers::WithPixels, "");
-    let flood: String = (0..10_000).map(|k| format!("\x1b[<35;{};9M", 1 + k % 800)).collect();
-    terminal.keys(&flood);
+    let moves: Vec<String> = (0..10_000).map(|k| format!("\x1b[<35;{};9M", 1 + k % 800)).collect();
+    terminal.keys(&moves.concat());
     terminal.keys("p");
     terminal.shows("progress hidden");
     end(&terminal);
