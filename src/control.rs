@@ -3,6 +3,7 @@
 pub mod cycle;
 mod effects;
 mod learning;
+mod rollout;
 pub mod scale;
 pub mod scribe;
 pub mod snapshot;

@@ -75,10 +75,10 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
 /// A whole session on virtual time.
 fn headless(run: &crate::cli::Run) -> Result<ExitCode, RunError> {
     let session = if let Some(folder) = &run.resume {
-        Session::resume(folder, Company::Headless)?
+        Session::resume(folder, &Company::Headless)?
     } else {
         let order = run.order().map_err(|error| RunError::Usage(error.to_string()))?;
-        Session::begin(&order, Company::Headless)?
+        Session::begin(&order, &Company::Headless)?
     };
     for notice in &session.notices {
         tell(notice);

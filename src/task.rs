@@ -89,6 +89,15 @@ pub trait Task: Send + Sync {
     /// without an end.
     fn ends(&self) -> Option<(f64, f64)>;
 
+    /// Whether the step from `state` to `next` led to an end of the track.
+    fn bumped(&self, state: &State, next: &State) -> bool {
+        let is_there = |state: &State| {
+            let ends = self.ends().zip(state.first());
+            ends.is_some_and(|((low, high), x)| *x <= low || *x >= high)
+        };
+        is_there(next) && !is_there(state)
+    }
+
     /// The largest action, in the plant's unit; the smallest is its negative.
     fn action_limit(&self) -> f64;
 }

@@ -374,7 +374,7 @@ fn a_discarded_rollout_is_in_no_refit() {
     let hands = Hands::new(&terminal::Params::default());
     let pointer = Pointer::default();
     let keys = Keys { hands, pointer, clock: WallClock::start() };
-    let session = Session::begin(&order, Company::Attended(keys)).unwrap();
+    let session = Session::begin(&order, &Company::Attended(keys)).unwrap();
     let folder = session.folder().to_owned();
     let watcher = session.watcher.clone();
     let mut person = Person { clock: VirtualClock::default(), watcher, discarded: false };

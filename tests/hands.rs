@@ -1,6 +1,6 @@
 //! Hands on a gamepad, the whole way from an event to the plant and the files, on virtual time.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking, helpers too")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking, helpers too")]
 
 #[path = "program/desk.rs"]
 #[expect(dead_code, reason = "shared with tests that need more of it")]

@@ -308,7 +308,7 @@ fn evaluated(logs: PathBuf, asks_until_signal: u32) -> (Finished, u32) {
         asked.set(asked.get() + 1);
         (asked.get() > asks_until_signal).then_some(15)
     };
-    let session = Session::begin(&order, Company::Headless).unwrap();
+    let session = Session::begin(&order, &Company::Headless).unwrap();
     let finished = session.run(&mut VirtualClock::default(), signal).unwrap();
     (finished, asked.get())
 }
@@ -327,7 +327,7 @@ fn a_signal_ends_the_evaluation_at_once_and_a_resume_completes_it() {
     assert!(!cut.folder.join("evaluation.csv").exists(), "half an evaluation");
     assert_eq!(status(&cut.folder), "interrupted");
 
-    let session = Session::resume(&cut.folder, Company::Headless).unwrap();
+    let session = Session::resume(&cut.folder, &Company::Headless).unwrap();
     let resumed = session.run(&mut VirtualClock::default(), || None).unwrap();
     assert_eq!(resumed.results.status, Status::Complete);
     for name in ["evaluation.csv", "steps.csv", "episodes.csv", "policy.json"] {

@@ -6,20 +6,21 @@
 use hdrhistogram::Histogram;
 
 use super::effects;
+use super::rollout::{Mind, Rollout, WentOn};
 use super::snapshot::{Command, MOST_REGIONS, Publisher, Snapshot};
 use super::witness::{Standing, Witness};
 use crate::backend::safety::Safe;
 use crate::backend::{Backend, Sensed};
 use crate::clock::{Clock, Pacer, Wake};
-use crate::learner::{Learner, Model, Refusal};
+use crate::learner::{Learner, Model};
 use crate::operator::{Feedback, Operator, View};
-use crate::record::{EpisodeRow, Momentum, StepRow};
+use crate::record::{EpisodeRow, StepRow};
 use crate::session::machine::{self, Event, Finish, Stage};
 use crate::session::plan::Plan;
 use crate::session::{Moment, Phase};
 use crate::sharing::{self, Mode, Sharing, mix};
 use crate::signal::{Action, End, Intent, Seconds, State, Tick};
-use crate::task::{Nothing, Occasion, Tally, Task};
+use crate::task::{Occasion, Task};
 use crate::teaching::{self, Sight, Teacher};
 
 /// Who and what takes part.
@@ -78,50 +79,6 @@ pub struct Outcome<W> {
     pub missed: u64,
     /// Who wrote it down.
     pub witness: W,
-}
-
-/// The learner, the shares and their counts: what a discard restores.
-#[derive(Clone)]
-pub(super) struct Mind {
-    pub(super) learner: Model,
-    pub(super) sharing: Sharing,
-    pub(super) learned: u64,
-    pub(super) refused: u64,
-    /// Tenths of main whose policies are stored.
-    pub(super) tenths: u8,
-}
-
-/// The rollout under way.
-pub(super) struct Rollout {
-    pub(super) start: f64,
-    pub(super) total_reward: f64,
-    pub(super) total_measure: f64,
-    pub(super) tally: Box<dyn Tally>,
-    /// Samples that the learner refused, and why.
-    pub(super) refused: Option<(u64, Refusal)>,
-    /// Ticks at which nobody was there to steer.
-    pub(super) absent: u32,
-}
-
-impl Default for Rollout {
-    fn default() -> Self {
-        Self {
-            start: 0.0,
-            total_reward: 0.0,
-            total_measure: 0.0,
-            tally: Box::new(Nothing),
-            refused: None,
-            absent: 0,
-        }
-    }
-}
-
-/// A rollout that does not begin at the task's start, and what it goes on with.
-#[derive(Clone)]
-pub(super) struct WentOn {
-    pub(super) phase: Phase,
-    pub(super) rollout: u32,
-    pub(super) momentum: Momentum,
 }
 
 /// A session under way.
@@ -309,7 +266,7 @@ impl<W: Witness> Cycle<W> {
                 next: &next,
                 end,
                 share: share.unwrap_or(1.0),
-                bumped: bumped(self.crew.task.ends(), &state, &next),
+                bumped: self.crew.task.bumped(&state, &next),
             });
         }
         self.rollout.total_reward += reward;
@@ -500,14 +457,6 @@ impl<W: Witness> Cycle<W> {
 /// What the rollouts of `phase` are for.
 pub(super) const fn occasion(phase: Phase) -> Occasion {
     if phase.is_steered() { Occasion::Taught } else { Occasion::Tested }
-}
-
-/// Whether the step from `state` to `next` led to one of the `ends` of the track.
-fn bumped(ends: Option<(f64, f64)>, state: &State, next: &State) -> bool {
-    let is_there = |state: &State| {
-        ends.zip(state.first()).is_some_and(|((low, high), x)| *x <= low || *x >= high)
-    };
-    is_there(next) && !is_there(state)
 }
 
 fn micros(lateness: Seconds) -> u32 {

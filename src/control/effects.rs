@@ -1,6 +1,7 @@
 //! What the cycle does about a transition of the session.
 
-use super::cycle::{Cycle, Mind, Rollout, WentOn, occasion};
+use super::cycle::{Cycle, occasion};
+use super::rollout::{Mind, Rollout, WentOn};
 use super::scale;
 use super::witness::{Happening, Standing, Witness};
 use crate::backend::Backend;

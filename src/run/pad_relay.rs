@@ -26,16 +26,13 @@ pub(super) fn pad_relay(words: &cli::PadRelay) -> Result<ExitCode, RunError> {
         return forward(socket);
     }
     let clock = WallClock::start();
-    let feed = match &words.events {
-        Some(file) => {
-            let events = Events::load(file).map_err(|e| RunError::Usage(e.to_string()))?;
-            Feed::Table(events.into_queue())
-        }
-        None => {
-            let hub = Hub::open(clock, &[]).map_err(|e| RunError::Failed(e.to_string()))?;
-            tell("relaying; Ctrl-C ends");
-            Feed::Pads(hub.listen(clock.now()))
-        }
+    let feed = if let Some(file) = &words.events {
+        let events = Events::load(file).map_err(|e| RunError::Usage(e.to_string()))?;
+        Feed::Table(events.into_queue())
+    } else {
+        let hub = Hub::open(clock, &[]).map_err(|e| RunError::Failed(e.to_string()))?;
+        tell("relaying; Ctrl-C ends");
+        Feed::Pads(hub.listen(clock.now()))
     };
     let run = draw_seed().map_err(|error| RunError::Failed(error.to_string()))?;
     relay(feed, clock, Outlet::new(run))

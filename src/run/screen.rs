@@ -145,13 +145,13 @@ struct Stage {
 impl Stage {
     fn start(&mut self, order: &Order) -> Result<Running, RunError> {
         let keys = self.keys();
-        let session = Session::begin(order, Company::Attended(keys.clone()))?;
+        let session = Session::begin(order, &Company::Attended(keys.clone()))?;
         self.raise_curtain(session, keys, order.clone())
     }
 
     fn take_up(&mut self, folder: &Path) -> Result<Running, RunError> {
         let keys = self.keys();
-        let session = Session::resume(folder, Company::Attended(keys.clone()))?;
+        let session = Session::resume(folder, &Company::Attended(keys.clone()))?;
         let sidecar = session.sidecar();
         let order = Order {
             subject: sidecar.subject.clone(),

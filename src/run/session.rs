@@ -110,7 +110,7 @@ impl Session {
     ///
     /// # Errors
     /// When the order cannot be carried out; nothing is left on the disk then.
-    pub fn begin(order: &Order, company: Company) -> Result<Self, RunError> {
+    pub fn begin(order: &Order, company: &Company) -> Result<Self, RunError> {
         let profile = profile_of(order)?;
         if order.backend != "simulated" {
             return Err(RunError::Usage(format!(
@@ -140,7 +140,7 @@ impl Session {
         };
         let choice: Choice =
             order.operator.parse().map_err(|e: operator::UnknownOperator| usage(&e))?;
-        let hand = steer(&choice, &profile, seed, &company)?;
+        let hand = steer(&choice, &profile, seed, company)?;
         let plan = Plan::new(&profile.session, profile.tick(), seed, company.is_attended());
         let fresh = fresh_learner(&profile)?;
 
@@ -204,7 +204,7 @@ impl Session {
     ///
     /// # Errors
     /// When there is none, it is complete, or its files are damaged; they are untouched then.
-    pub fn resume(path: &Path, company: Company) -> Result<Self, RunError> {
+    pub fn resume(path: &Path, company: &Company) -> Result<Self, RunError> {
         let failed = |error: record::Error| RunError::Usage(error.to_string());
         let folder = Folder::open(path).map_err(failed)?;
         // Everything that could be refused is looked at before the folder is touched.
@@ -214,7 +214,7 @@ impl Session {
             .map_err(|report| RunError::Usage(report.to_string()))?;
         let choice: Choice =
             sidecar.operator.parse().map_err(|e: operator::UnknownOperator| usage(&e))?;
-        let hand = steer(&choice, &profile, sidecar.seed, &company)?;
+        let hand = steer(&choice, &profile, sidecar.seed, company)?;
         let plan = Plan::new(&profile.session, profile.tick(), sidecar.seed, company.is_attended());
         let fresh = fresh_learner(&profile)?;
         let frozen = record::read_policy::<Model>(&path.join("policy.json")).ok();
@@ -316,7 +316,7 @@ impl Parts {
         learner: Model,
         from: Option<(Standing, Vec<EpisodeRow>)>,
         tenths: Vec<(u8, Model)>,
-        company: Company,
+        company: &Company,
         notices: Vec<String>,
     ) -> Session {
         let Self { profile, sidecar, folder, plan, fresh, hand, recorder } = self;

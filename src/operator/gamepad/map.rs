@@ -34,7 +34,7 @@ pub enum Axis {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Button {
-    /// A on an Xbox pad, the cross on a PlayStation's.
+    /// A on an Xbox pad, the cross on Sony's.
     South,
     /// B, circle.
     East,

@@ -20,9 +20,16 @@ fn press(id: u32, button: Button) -> [Event; 2] {
     [true, false].map(|is_pressed| Event::Button { pad: Id(id), button, is_pressed })
 }
 
+/// Lets `events` happen to `pads`.
+fn happen(pads: &mut Pads, events: impl IntoIterator<Item = Event>) {
+    for event in events {
+        pads.take(event, NOW);
+    }
+}
+
 fn after(params: &Params, events: impl IntoIterator<Item = Event>) -> Pads {
     let mut pads = Pads::new(params);
-    events.into_iter().for_each(|event| pads.take(event, NOW));
+    happen(&mut pads, events);
     pads
 }
 
@@ -83,12 +90,12 @@ fn of_two_pads_the_first_steers_and_the_other_takes_over_with_its_begin_button()
     assert_eq!(pads.deflection(), Some(0.0));
     // Its buttons mean nothing else while it waits, but for the emergency stop.
     for button in [Button::Select, Button::North, Button::South] {
-        press(2, button).into_iter().for_each(|event| pads.take(event, NOW));
+        happen(&mut pads, press(2, button));
     }
     assert_eq!(news(&mut pads), []);
-    press(2, Button::East).into_iter().for_each(|event| pads.take(event, NOW));
+    happen(&mut pads, press(2, Button::East));
     assert_eq!(news(&mut pads), [News::Asks(Request::Stop)]);
-    press(2, Button::Start).into_iter().for_each(|event| pads.take(event, NOW));
+    happen(&mut pads, press(2, Button::Start));
     assert_eq!(news(&mut pads), [News::Back("B steers from now on".to_owned())]);
     assert_eq!(pads.deflection(), None, "its stick is held off the centre");
     pads.take(stick(2, 0.0), NOW);
@@ -106,7 +113,7 @@ fn a_wanted_pad_is_known_by_its_name_or_guid_and_no_other_steers() {
         let params = Params { pad: Some(wanted.to_owned()), ..Params::default() };
         let mut pads = after(&params, [connected(1, "Xbox"), stick(1, 0.0)]);
         assert_eq!(pads.deflection(), None);
-        press(1, Button::Start).into_iter().for_each(|event| pads.take(event, NOW));
+        happen(&mut pads, press(1, Button::Start));
         assert_eq!(pads.deflection(), None);
         assert!(pads.trouble().unwrap().contains(&format!("no gamepad `{wanted}`")));
         pads.take(connected(0xab, "Logitech WingMan"), NOW);
@@ -120,14 +127,14 @@ fn a_held_button_asks_once_and_every_button_for_what_it_is_mapped_to() {
     let mut pads = after(&params, [connected(1, "A")]);
     news(&mut pads);
     let [down, up] = press(1, Button::Select);
-    [down.clone(), down.clone(), up, down].into_iter().for_each(|event| pads.take(event, NOW));
+    happen(&mut pads, [down.clone(), down.clone(), up, down]);
     assert_eq!(news(&mut pads), [News::Asks(Request::Pause), News::Asks(Request::Pause)]);
     for (button, request) in [
         (Button::Start, Request::Begin),
         (Button::North, Request::Discard),
         (Button::East, Request::Stop),
     ] {
-        press(1, button).into_iter().for_each(|event| pads.take(event, NOW));
+        happen(&mut pads, press(1, button));
         assert_eq!(news(&mut pads), [News::Asks(request)]);
     }
 }

@@ -25,7 +25,9 @@ fn stick(pads: &mut Pads, value: f64) {
 
 /// The far end after it was told `events`.
 fn hear(far: &mut Pads, events: Vec<Event>) {
-    events.into_iter().for_each(|event| far.take(event, Seconds(0.0)));
+    for event in events {
+        far.take(event, Seconds(0.0));
+    }
 }
 
 #[test]
