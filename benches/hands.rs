@@ -336,7 +336,7 @@ mod parent {
                     match &mut self.hand {
                         Hand::Keys => burst.extend(b"\x1b[1;1:2C"),
                         Hand::Mouse { .. } => {
-                            burst.extend(format!("\x1b[<35;{};10M", 1 + k % 80).bytes())
+                            burst.extend(format!("\x1b[<35;{};10M", 1 + k % 80).bytes());
                         }
                         Hand::Pad { pads, outlet, .. } => {
                             let value = f64::from(k % 100) / 100.0;
