@@ -1,6 +1,8 @@
 //! Hands on a gamepad or joystick.
 
+pub mod learn;
 mod map;
+pub mod rights;
 
 pub use map::{Axis, Button, Map};
 
