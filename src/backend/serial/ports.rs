@@ -190,7 +190,8 @@ fn adapters(host: &Host) -> Vec<(u16, u16)> {
         u16::from_str_radix(&text, 16).ok()
     };
     let devices = host.names("/sys/bus/usb/devices");
-    let all = devices.iter().filter_map(|d| Some((number(d, "idVendor")?, number(d, "idProduct")?)));
+    let all =
+        devices.iter().filter_map(|d| Some((number(d, "idVendor")?, number(d, "idProduct")?)));
     // FTDI, WCH and Silicon Labs make other things too; these are their serial lines.
     let is_serial = |(vendor, product): &(u16, u16)| match vendor {
         0x0403 => matches!(product, 0x6001 | 0x6010 | 0x6011 | 0x6014 | 0x6015),
@@ -281,7 +282,8 @@ fn modem_manager(host: &Host, ports: &[Port]) -> Option<Problem> {
 fn slow(port: &Port) -> Option<Problem> {
     let latency = port.latency_ms.filter(|latency| *latency > QUICK_MS)?;
     let device = port.path.rsplit('/').next().unwrap_or(&port.path);
-    let rule = r#"ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1""#;
+    let rule =
+        r#"ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1""#;
     Some(problem(
         format!(
             "{}: its FTDI chip keeps bytes up to {latency} ms, too long for a control loop",
@@ -400,10 +402,7 @@ mod tests {
         assert!(problems[0].mend.starts_with("newgrp uucp"), "{problems:?}");
         fake.file("etc/group", &format!("uucp:x:{id}:bob\n"));
         let problems = fake.problems();
-        assert_eq!(
-            problems[0].mend,
-            "sudo usermod -aG uucp ann    # then log out and in again"
-        );
+        assert_eq!(problems[0].mend, "sudo usermod -aG uucp ann    # then log out and in again");
     }
 
     #[test]

@@ -32,14 +32,39 @@ pub enum Step {
 }
 
 /// How one axis has moved since the question.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Travel {
     /// Where it is.
     at: f64,
     /// The farthest from the middle that it was, with its sign.
     peak: f64,
-    /// Whether it was seen in the middle before it moved; unknown until it says something.
-    rests_elsewhere: bool,
+    /// Whether it was out when the question came, as a trigger is at rest.
+    began_out: bool,
+    /// Whether it was never seen on its way out: it tells where it rests, or has no between.
+    jumped: bool,
+    /// Whether it knows nothing between the middle and its ends, as a directional pad.
+    is_digital: bool,
+}
+
+impl Travel {
+    /// Asked anew while it is at `at`; an axis that never said anything is in the middle.
+    fn from(at: f64) -> Self {
+        Self { at, peak: 0.0, began_out: at.abs() > BACK, jumped: false, is_digital: true }
+    }
+
+    fn go(&mut self, to: f64) {
+        self.jumped |= self.peak == 0.0 && to.abs() >= FAR;
+        self.is_digital &= to == 0.0 || to.abs() > 0.999;
+        if to.abs() > self.peak.abs() {
+            self.peak = to;
+        }
+        self.at = to;
+    }
+
+    /// Whether it went far from the middle as a stick or a directional pad does.
+    fn was_moved(&self) -> bool {
+        self.peak.abs() >= FAR && !self.began_out && (!self.jumped || self.is_digital)
+    }
 }
 
 /// The pupil.
@@ -62,11 +87,8 @@ impl Learner {
         invert: bool,
         axes: impl IntoIterator<Item = (Axis, Option<f64>)>,
     ) -> Self {
-        let travel = |at: Option<f64>| {
-            let at = at.unwrap_or(0.0);
-            Travel { at, peak: 0.0, rests_elsewhere: at.abs() > BACK }
-        };
-        let travels = axes.into_iter().map(|(axis, at)| (axis, travel(at))).collect();
+        let travel = |(axis, at): (Axis, Option<f64>)| (axis, Travel::from(at.unwrap_or(0.0)));
+        let travels = axes.into_iter().map(travel).collect();
         Self { map, invert, step: Step::Steer, travels, pressed: [false; 4], remark: None }
     }
 
@@ -112,14 +134,7 @@ impl Learner {
         if !value.is_finite() {
             return;
         }
-        let travel = self.travels.entry(axis).or_default();
-        travel.at = value;
-        if travel.rests_elsewhere {
-            // A trigger at its end; a stick that was held while the question came lets go here.
-            travel.rests_elsewhere = value.abs() > BACK;
-        } else if value.abs() > travel.peak.abs() {
-            travel.peak = value;
-        }
+        self.travels.entry(axis).or_insert_with(|| Travel::from(0.0)).go(value);
         if self.step == Step::Steer {
             self.settle();
         }
@@ -159,16 +174,17 @@ impl Learner {
 
     /// Takes the axis that was moved most, once it is back in the middle.
     fn settle(&mut self) {
-        let moved = |(axis, travel): (&Axis, &Travel)| (*axis, *travel);
-        let far = |(_, travel): &(Axis, Travel)| travel.peak.abs() >= FAR;
-        let mut all: Vec<(Axis, Travel)> = self.travels.iter().map(moved).filter(far).collect();
-        all.sort_by(|(_, a), (_, b)| b.peak.abs().total_cmp(&a.peak.abs()));
-        // What went out and stays there, a throttle or a trigger at rest, does not count.
-        let mut back = all.into_iter().filter(|(_, travel)| travel.at.abs() <= BACK);
-        let Some((axis, travel)) = back.next() else { return };
-        if let Some((other, second)) = back.next()
-            && travel.peak.abs() - second.peak.abs() < CLEARLY
-        {
+        let mut moved: Vec<(Axis, Travel)> =
+            self.travels.iter().filter(|(_, t)| t.was_moved()).map(|(a, t)| (*a, *t)).collect();
+        moved.sort_by(|(_, a), (_, b)| b.peak.abs().total_cmp(&a.peak.abs()));
+        // What went out and stays there is a throttle.
+        let is_back = |(_, travel): &(Axis, Travel)| travel.at.abs() <= BACK;
+        let Some((axis, travel)) = moved.iter().copied().find(is_back) else { return };
+        let alike = |(other, second): &&(Axis, Travel)| {
+            *other != axis && travel.peak.abs() - second.peak.abs() < CLEARLY && !second.is_digital
+        };
+        if let Some((other, _)) = moved.iter().find(alike) {
+            // The next time one that is still out does not count.
             self.remark = Some(format!("{axis} and {other} moved alike: move one, straight"));
             self.forget();
             return;
@@ -228,7 +244,7 @@ impl Learner {
     /// Forgets how far the axes went.
     fn forget(&mut self) {
         for travel in self.travels.values_mut() {
-            *travel = Travel { peak: 0.0, rests_elsewhere: travel.at.abs() > BACK, ..*travel };
+            *travel = Travel::from(travel.at);
         }
     }
 
@@ -290,7 +306,7 @@ mod tests {
         for n in 0..100 {
             pupil.moved(Axis::LeftStickY, if n % 2 == 0 { 0.1 } else { -0.1 });
         }
-        // One at its end that is known, one that says so only now, a throttle, no number.
+        // One at its end that is known, one that says so only now, another, no number.
         pupil.moved(Axis::LeftZ, -0.99);
         pupil.moved(Axis::RightZ, -1.0);
         pupil.moved(Axis::Code(40), 0.9);
@@ -303,11 +319,14 @@ mod tests {
     #[test]
     fn a_trigger_that_is_pulled_through_its_middle_does_not_win() {
         let mut pupil = learner(&[(Axis::LeftZ, Some(-1.0))]);
-        for value in [-0.5, 0.0, 0.5, 1.0, 0.5, -0.5, -1.0] {
+        for value in [-0.5, 0.0, 0.5, 1.0, 0.5, 0.1, -0.5, -1.0] {
             pupil.moved(Axis::LeftZ, value);
         }
-        // On its way it looked like a stick for a moment; at the end it does not rest there.
-        assert!(pupil.map().steer != Axis::LeftZ, "{pupil:?}");
+        // The same of one that had not said where it rests.
+        for value in [-0.95, -0.5, 0.0, 0.5, 1.0, 0.5, 0.1, -0.5, -1.0] {
+            pupil.moved(Axis::RightZ, value);
+        }
+        assert_eq!(pupil.step(), Step::Steer, "{pupil:?}");
     }
 
     #[test]
@@ -325,6 +344,22 @@ mod tests {
         }
         assert_eq!(pupil.step(), Step::Steer);
         assert!(pupil.remark().is_some_and(|remark| remark.contains("moved alike")), "{pupil:?}");
+        // A throttle that was pushed on the way is passed over the next time.
+        for value in [0.3, 0.9] {
+            pupil.moved(Axis::Code(9), value);
+        }
+        swing(&mut pupil, Axis::RightStickX, 0.95);
+        assert!(pupil.remark().is_some_and(|remark| remark.contains("code(9)")), "{pupil:?}");
+        swing(&mut pupil, Axis::RightStickX, 0.95);
+        assert_eq!(pupil.map().steer, Axis::RightStickX);
+    }
+
+    #[test]
+    fn a_directional_pad_has_no_way_between_and_can_steer() {
+        let mut pupil = learner(&[]);
+        pupil.moved(Axis::DPadX, -1.0);
+        pupil.moved(Axis::DPadX, 0.0);
+        assert_eq!((pupil.map().steer, pupil.invert()), (Axis::DPadX, true));
     }
 
     #[test]
@@ -388,9 +423,6 @@ mod tests {
         pupil.leave_out();
         pupil.keep();
         pupil.keep();
-        let text = "(map: (steer: left_stick_x), shape: (invert: true))";
-        let params: super::super::Params = ron::from_str(text).unwrap();
-        assert!(params.shape.invert);
         for (key, value) in pupil.sets().iter().filter(|(key, _)| key.contains("map.")) {
             let name = key.rsplit('.').next().unwrap();
             let map: Map = ron::from_str(&format!("({name}: {value})")).unwrap();

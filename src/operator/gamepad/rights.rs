@@ -191,9 +191,8 @@ fn udev(host: &Host, build: Build) -> Option<Problem> {
             format!("sudo apt install libudev1\n{WITHOUT_UDEV}"),
         ));
     }
-    (!host.exists("/run/udev")).then(|| {
-        problem("udev does not run here (a container?): no pad is reported", WITHOUT_UDEV)
-    })
+    (!host.exists("/run/udev"))
+        .then(|| problem("udev does not run here (a container?): no pad is reported", WITHOUT_UDEV))
 }
 
 #[cfg(test)]
