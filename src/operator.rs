@@ -41,6 +41,8 @@ pub struct Feedback<'a> {
     pub end: Option<End>,
     /// The person's share in the applied action.
     pub share: f64,
+    /// Whether the plant ran into the end of its track.
+    pub bumped: bool,
 }
 
 /// What a device asks for beside its deflection, with its buttons.
@@ -67,8 +69,6 @@ pub enum News {
     Back(String),
     /// Something else that whoever reads the data wants to know.
     Remark(String),
-    /// It has nothing more to say, ever; a session that nobody attends ends here.
-    Over(String),
 }
 
 /// What an operator has steered before a rollout, in introduction and main together.
@@ -94,8 +94,14 @@ pub trait Operator: Send {
         None
     }
 
-    /// Whether the device is gone, so that nobody can steer before it is back.
+    /// Whether the device is gone, or back but not at its centre yet: nobody can steer.
     fn is_gone(&self) -> bool {
+        false
+    }
+
+    /// Whether there will never be news again, so that a session that nobody attends would
+    /// wait for ever.
+    fn is_over(&self) -> bool {
         false
     }
 

@@ -85,6 +85,10 @@ pub trait Task: Send + Sync {
         Box::new(Nothing)
     }
 
+    /// Where the plant's track ends, as values of the state's first number; `None` for one
+    /// without an end.
+    fn ends(&self) -> Option<(f64, f64)>;
+
     /// The largest action, in the plant's unit; the smallest is its negative.
     fn action_limit(&self) -> f64;
 }

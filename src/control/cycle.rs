@@ -309,6 +309,7 @@ impl<W: Witness> Cycle<W> {
                 next: &next,
                 end,
                 share: share.unwrap_or(1.0),
+                bumped: bumped(self.crew.task.ends(), &state, &next),
             });
         }
         self.rollout.total_reward += reward;
@@ -499,6 +500,14 @@ impl<W: Witness> Cycle<W> {
 /// What the rollouts of `phase` are for.
 pub(super) const fn occasion(phase: Phase) -> Occasion {
     if phase.is_steered() { Occasion::Taught } else { Occasion::Tested }
+}
+
+/// Whether the step from `state` to `next` led to one of the `ends` of the track.
+fn bumped(ends: Option<(f64, f64)>, state: &State, next: &State) -> bool {
+    let is_there = |state: &State| {
+        ends.zip(state.first()).is_some_and(|((low, high), x)| *x <= low || *x >= high)
+    };
+    is_there(next) && !is_there(state)
 }
 
 fn micros(lateness: Seconds) -> u32 {

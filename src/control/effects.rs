@@ -297,12 +297,6 @@ impl<W: Witness> Cycle<W> {
                 News::Gone(words) => ("device_gone", words),
                 News::Back(words) => ("device_back", words),
                 News::Remark(words) => ("device", words),
-                News::Over(words) if self.rules.plan.attended => ("device", words),
-                News::Over(words) => {
-                    self.cause.get_or_insert(words);
-                    self.happen(Event::Abort);
-                    continue;
-                }
             };
             self.note(event, self.stage.moment(), None, words);
         }
@@ -310,6 +304,12 @@ impl<W: Witness> Cycle<W> {
         let is_due = matches!(self.stage, Stage::Running(_) | Stage::Hold { .. });
         if is_steered && is_due && self.crew.operator.is_gone() {
             self.happen(Event::Pause);
+        }
+        let waits = matches!(self.stage, Stage::Paused(_) | Stage::Stopped(_));
+        if waits && !self.rules.plan.attended && self.crew.operator.is_over() {
+            let why = "the session waits, and its operator has nothing more to say";
+            self.cause.get_or_insert_with(|| why.to_owned());
+            self.happen(Event::Abort);
         }
     }
 

@@ -1,15 +1,21 @@
 //! What an order comes to on this disk: which policy, which mode, which operator.
 
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
 use super::RunError;
 use super::session::{Company, Keys, usage};
+use crate::clock::WallClock;
 use crate::control::scribe::Device;
 use crate::learner::{Learner, Model};
+use crate::operator::gamepad::events::Events;
+use crate::operator::gamepad::hub::Hub;
+use crate::operator::gamepad::link::Link;
+use crate::operator::gamepad::{self, Gamepad, Source};
 use crate::operator::script::{Recorded, Script};
 use crate::operator::simulated::{self, Kind, Skill};
 use crate::operator::terminal::Keyboard;
-use crate::operator::{self, Choice, Operator};
+use crate::operator::{self, Choice, Operator, Via};
 use crate::profile::{Experiment, Order, Profile};
 use crate::random::{Place, Purpose, stream};
 use crate::record::{self, assignment, folder, policy, reader};
@@ -140,7 +146,13 @@ pub(super) fn steer(
             let operator = simulated_operator(&profile.experiment, (*skill, *kind), seed, tick);
             Hand { operator, device: None }
         }
-        Choice::Gamepad(_) | Choice::Mouse => return Err(RunError::Usage(String::new())),
+        Choice::Gamepad(via) => {
+            let source = pad_source(via, &params.gamepad, company)?;
+            let gamepad = Gamepad::new(source, &params.gamepad, limit, tick);
+            let device = Device { badge: gamepad.badge(), hands: None };
+            Hand { operator: Box::new(gamepad), device: Some(device) }
+        }
+        Choice::Mouse => return Err(RunError::Usage(String::new())),
         Choice::Keyboard => {
             let Keys { hands, clock } = attended(company, "keyboard")?;
             let keyboard = Keyboard::new(hands.clone(), *clock, &params.keyboard, limit, tick);
@@ -148,6 +160,46 @@ pub(super) fn steer(
             Hand { operator: Box::new(keyboard), device: Some(device) }
         }
     })
+}
+
+/// Where the events of a gamepad come from. A computer without pads, or without a way to
+/// them, is none that refuses the session: the screen says what is the matter.
+fn pad_source(via: &Via, params: &gamepad::Params, company: &Company) -> Result<Source, RunError> {
+    match via {
+        Via::Script(file) => Ok(Source::script(Events::load(file).map_err(|e| usage(&e))?)),
+        Via::Here => {
+            let clock = attended(company, "gamepad")?.clock;
+            Ok(match Hub::open(clock, &params.sdl_mappings) {
+                Ok(hub) => Source::here(&hub, clock),
+                Err(why) => Source::nothing(why.to_string()),
+            })
+        }
+        Via::RelayInput => {
+            let clock = attended(company, "relayed gamepad")?.clock;
+            if io::stdin().is_terminal() {
+                return Err(RunError::Usage(
+                    "gamepad:relay=- reads standard input, which is a terminal here: run \
+                     ssh PAD-COMPUTER coadapt pad-relay | coadapt run …, or use \
+                     gamepad:relay=unix:PATH"
+                        .to_owned(),
+                ));
+            }
+            let link = Link::standard_input(clock).map_err(|e| RunError::Failed(e.to_string()))?;
+            Ok(Source::relay(link, clock))
+        }
+        Via::RelaySocket(path) => relay_socket(path, attended(company, "relayed gamepad")?.clock),
+    }
+}
+
+#[cfg(unix)]
+fn relay_socket(path: &Path, clock: WallClock) -> Result<Source, RunError> {
+    let socket = gamepad::link::Socket::listen(path, clock).map_err(|error| usage(&error))?;
+    Ok(Source::socket(socket, clock))
+}
+
+#[cfg(not(unix))]
+fn relay_socket(_path: &Path, _clock: WallClock) -> Result<Source, RunError> {
+    Err(RunError::Usage("this system has no Unix sockets: use gamepad:relay=-".to_owned()))
 }
 
 /// The keys and the clock of a session with a person at `device`.

@@ -50,6 +50,7 @@ pub struct Balance {
     cap_steps: u32,
     omega_squared: f64,
     force_limit: f64,
+    track_length: Option<f64>,
 }
 
 impl Balance {
@@ -68,6 +69,7 @@ impl Balance {
             // ω² = g / (1.24 l) of a pole on a cart that is not held; l is half the pole.
             omega_squared: plant.gravity_m_s2 / (1.24 * plant.pole_length_m / 2.0),
             force_limit: plant.force_limit_n,
+            track_length: plant.track_length_m,
         }
     }
 
@@ -151,6 +153,10 @@ impl Task for Balance {
 
     fn region(&self, _state: &State) -> usize {
         0
+    }
+
+    fn ends(&self) -> Option<(f64, f64)> {
+        self.track_length.map(|length| (-length / 2.0, length / 2.0))
     }
 
     fn action_limit(&self) -> f64 {

@@ -184,6 +184,11 @@ impl Task for MountainCar {
         0
     }
 
+    fn ends(&self) -> Option<(f64, f64)> {
+        // To the right it ends at the goal, which is no wall.
+        Some((self.plant.left_wall, f64::INFINITY))
+    }
+
     fn action_limit(&self) -> f64 {
         self.plant.throttle_limit
     }

@@ -91,6 +91,7 @@ pub struct SpeedUp {
     rollout_steps: u32,
     test_steps: u32,
     region: [Region; 1],
+    half_length: f64,
     voltage_limit: f64,
 }
 
@@ -109,6 +110,7 @@ impl SpeedUp {
             rollout_steps: steps_of(rules.rollout_s, tick),
             test_steps: steps_of(rules.test_s, tick),
             region: [Region { name: "all", scale }],
+            half_length: plant.beam_half_length_m,
             voltage_limit: plant.voltage_limit_v,
         }
     }
@@ -228,6 +230,10 @@ impl Task for SpeedUp {
 
     fn tally(&self) -> Box<dyn Tally> {
         Box::new(Speeds { limit: self.rules.limit_m, ..Speeds::default() })
+    }
+
+    fn ends(&self) -> Option<(f64, f64)> {
+        Some((-self.half_length, self.half_length))
     }
 
     fn action_limit(&self) -> f64 {

@@ -180,6 +180,7 @@ pub struct SwingUp {
     tick: f64,
     omega_squared: f64,
     force_limit: f64,
+    track_length: Option<f64>,
 }
 
 impl SwingUp {
@@ -219,6 +220,7 @@ impl SwingUp {
             // ω² = 3g / 4l of a uniform rod about its end; l is half the pole.
             omega_squared: 1.5 * plant.gravity_m_s2 / plant.pole_length_m,
             force_limit: plant.force_limit_n,
+            track_length: plant.track_length_m,
         }
     }
 
@@ -328,6 +330,10 @@ impl Task for SwingUp {
             tick: self.tick,
             ..Heights::default()
         })
+    }
+
+    fn ends(&self) -> Option<(f64, f64)> {
+        self.track_length.map(|length| (-length / 2.0, length / 2.0))
     }
 
     fn action_limit(&self) -> f64 {
