@@ -126,6 +126,18 @@ fn a_terminal_that_never_answers_is_served_all_the_same() {
     terminal.is_given_back();
 }
 
+#[test]
+fn keys_typed_while_the_terminal_is_asked_arrive() {
+    // Before the answers, among them and after them: help is opened, closed and opened again.
+    let mut terminal = Seat { answers: Answers::Among("?"), ..Seat::default() }.open("");
+    terminal.shows("keys: set-up");
+    terminal.keys("?");
+    terminal.shows_that("no help", |screen| !screen.contains("keys: set-up"));
+    terminal.keys("q");
+    assert_eq!(terminal.code(), 0);
+    terminal.is_given_back();
+}
+
 /// The number beside the bar `you`, N.
 fn push(screen: &str) -> Option<f64> {
     let row = screen.lines().find(|line| line.starts_with(" you") && line.contains(" N "))?;

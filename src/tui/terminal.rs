@@ -1,4 +1,8 @@
-//! The terminal: taken over, read by one thread, and always given back.
+//! The terminal: taken over, asked, read by one thread, and always given back.
+
+mod abilities;
+mod answers;
+mod probe;
 
 use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,9 +18,14 @@ use ratatui::crossterm::event::{
 };
 use ratatui::crossterm::terminal::{
     BeginSynchronizedUpdate, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen,
-    disable_raw_mode, enable_raw_mode, supports_keyboard_enhancement,
+    disable_raw_mode, enable_raw_mode,
 };
 use ratatui::crossterm::{cursor, execute, queue};
+
+pub use abilities::Abilities;
+pub use probe::probe;
+
+use probe::Tty;
 
 use super::palette::{Glyphs, Look, Palette};
 use crate::clock::{Clock, WallClock};
@@ -215,36 +224,53 @@ pub fn is_taken() -> bool {
     TAKEN.load(Ordering::SeqCst)
 }
 
-/// The one reader of the terminal: feeds the hands at once and passes everything on.
+/// The one reader of the terminal: asks what it can do, feeds the hands at once, and passes
+/// everything on.
 ///
-/// It also asks whether releases can be reported. A terminal that never answers delays the
-/// first keys by that question's time-out, but no picture.
+/// A terminal that never answers delays how the first keys are understood, but neither a key
+/// nor a picture: what is typed while it is asked is passed on as it comes.
 fn read(sender: &SyncSender<Heard>, feed: &Feed, stop: &AtomicBool) {
-    if supports_keyboard_enhancement().unwrap_or(false) && is_taken() {
-        let flags = KeyboardEnhancementFlags::DISAMBIGUATE_ESCAPE_CODES
-            | KeyboardEnhancementFlags::REPORT_EVENT_TYPES
-            | KeyboardEnhancementFlags::REPORT_ALL_KEYS_AS_ESCAPE_CODES
-            | KeyboardEnhancementFlags::REPORT_ALTERNATE_KEYS;
-        if execute!(io::stdout(), PushKeyboardEnhancementFlags(flags)).is_ok() {
-            REPORTS_RELEASES.store(true, Ordering::SeqCst);
-            feed.hands().set_releases_known(true);
+    let pass = |event: Event| {
+        feed.take(&event);
+        // A full queue means that nobody looks; hands were fed all the same.
+        let _ = sender.try_send(Heard::Event(event));
+    };
+    let is_stopped = || stop.load(Ordering::SeqCst);
+    let asked = Tty::open().and_then(|tty| probe::ask(&tty, feed.clock, pass, is_stopped));
+    match asked {
+        Ok(abilities) => report_releases(&abilities, feed),
+        Err(_) => {
+            let _ = sender.try_send(Heard::Lost);
+            return;
         }
     }
-    while !stop.load(Ordering::SeqCst) {
+    while !is_stopped() {
         match event::poll(Duration::from_millis(100))
             .and_then(|ready| if ready { event::read().map(Some) } else { Ok(None) })
         {
-            Ok(Some(event)) => {
-                feed.take(&event);
-                // A full queue means that nobody looks; hands were fed all the same.
-                let _ = sender.try_send(Heard::Event(event));
-            }
+            Ok(Some(event)) => pass(event),
             Ok(None) => {}
             Err(_) => {
                 let _ = sender.try_send(Heard::Lost);
                 return;
             }
         }
+    }
+}
+
+/// Has the terminal report key releases, if it can.
+fn report_releases(abilities: &Abilities, feed: &Feed) {
+    if !abilities.key_releases || !is_taken() {
+        return;
+    }
+    // Without all keys as escape codes, letters would have no releases.
+    let flags = KeyboardEnhancementFlags::DISAMBIGUATE_ESCAPE_CODES
+        | KeyboardEnhancementFlags::REPORT_EVENT_TYPES
+        | KeyboardEnhancementFlags::REPORT_ALL_KEYS_AS_ESCAPE_CODES
+        | KeyboardEnhancementFlags::REPORT_ALTERNATE_KEYS;
+    if execute!(io::stdout(), PushKeyboardEnhancementFlags(flags)).is_ok() {
+        REPORTS_RELEASES.store(true, Ordering::SeqCst);
+        feed.hands().set_releases_known(true);
     }
 }
 

@@ -26,6 +26,10 @@ pub enum Answers {
     Plainly,
     /// That it also reports key releases.
     WithKitty,
+    /// That it also reports the mouse in pixels; a cell has 10 by 20.
+    WithPixels,
+    /// Plainly, while keys are typed.
+    Among(&'static str),
 }
 
 /// How a terminal is to be.
@@ -118,14 +122,19 @@ fn read(
         let mut seen = seen.lock().unwrap();
         seen.raw.extend_from_slice(&bytes[..count]);
         seen.screen.process(&bytes[..count]);
-        if !asked && contains(&seen.raw, b"\x1b[?u\x1b[c") {
+        if !asked && contains(&seen.raw, b"\x1b[c") {
             asked = true;
-            let answer: &[u8] = match answers {
-                Answers::Never => b"",
-                Answers::Plainly => b"\x1b[?62c",
-                Answers::WithKitty => b"\x1b[?0u\x1b[?62c",
+            assert!(contains(&seen.raw, b"\x1b[?u"), "the last question came first");
+            let answer = match answers {
+                Answers::Never => String::new(),
+                Answers::Plainly => "\x1b[?1016;0$y\x1b[?62c".to_owned(),
+                Answers::WithKitty => "\x1b[?0u\x1b[?62c".to_owned(),
+                Answers::WithPixels => {
+                    "\x1b[?1016;2$y\x1b[?2026;2$y\x1b[6;20;10t\x1b[?62c".to_owned()
+                }
+                Answers::Among(keys) => format!("{keys}\x1b[?1016;0$y{keys}\x1b[?62c{keys}"),
             };
-            writer.lock().unwrap().write_all(answer).unwrap();
+            writer.lock().unwrap().write_all(answer.as_bytes()).unwrap();
         }
     }
 }
