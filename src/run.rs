@@ -1,6 +1,7 @@
 //! The composition root: the one room that knows every other.
 
 mod choose;
+mod devices;
 mod evaluate;
 mod fit;
 pub mod outcome;
@@ -67,6 +68,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Fit(words)) => fit::fit(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::Profile(profile)) => words::profile(profile),
+        Some(Command::Devices(words)) => devices::devices(words),
     }
 }
 

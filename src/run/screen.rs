@@ -35,7 +35,7 @@ use crate::tui::terminal::{Feed, Screen, give_back, is_taken};
 const PROFILES: &str = "profiles";
 
 /// What a panic said while the screen was up, kept until the terminal is given back.
-static LAST_WORDS: Mutex<Option<String>> = Mutex::new(None);
+pub(super) static LAST_WORDS: Mutex<Option<String>> = Mutex::new(None);
 
 /// Opens the set-up screen, or the session that the command line asks for.
 pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
@@ -100,7 +100,7 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
 }
 
 /// A panic may say its words only after the terminal was given back.
-fn keep_panics_off_the_screen() {
+pub(super) fn keep_panics_off_the_screen() {
     let previous = panic::take_hook();
     panic::set_hook(Box::new(move |info| {
         if is_taken() {

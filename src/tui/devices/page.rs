@@ -1,0 +1,71 @@
+//! The devices screen at work: hears pads and keys, looks at the files now and then, saves.
+
+use std::time::Duration;
+
+use ratatui::crossterm::event::Event as Heard;
+
+use super::{Devices, Extras, Reaction, Survey, draw};
+use crate::clock::Clock;
+use crate::operator::gamepad::Event;
+use crate::signal::Seconds;
+use crate::tui::app::End;
+use crate::tui::terminal::{self, Screen, look};
+
+/// The pace of the picture.
+const FRAME: Duration = Duration::from_millis(33);
+/// How often the files are looked at.
+const SURVEY: Seconds = Seconds(1.0);
+
+/// Does what the screen cannot: looks at the computer and listens to its pads.
+pub trait Bench {
+    /// What is plugged in now, where `heard` pads are heard.
+    fn survey(&mut self, heard: usize) -> Survey;
+
+    /// What happened at the pads since it was asked last.
+    fn events(&mut self) -> Vec<(Event, Seconds)>;
+
+    /// Whether a signal asked the program to end.
+    fn is_told_to_end(&self) -> bool;
+}
+
+/// Shows the devices until the person leaves.
+pub fn show(screen: &mut Screen, bench: &mut dyn Bench, mut devices: Devices) -> End {
+    let clock = screen.feed().clock;
+    let mut due = clock.now();
+    loop {
+        for (event, at) in bench.events() {
+            devices.hear(&event, at);
+        }
+        if clock.now() >= due {
+            devices.take(bench.survey(devices.heard()));
+            due = clock.now() + SURVEY;
+        }
+        let hands = screen.feed().hands();
+        let keyboard = &devices.profile().operator.keyboard;
+        let extras = Extras {
+            look: look(devices.profile().screen.glyphs),
+            key_releases: hands.knowledge().words(),
+            push: keyboard.push * hands.push(clock.now()),
+        };
+        if screen.draw(|frame| draw(frame, &devices, &extras)).is_err() {
+            return End::Lost;
+        }
+        if bench.is_told_to_end() {
+            return End::Signal;
+        }
+        match screen.hear(FRAME) {
+            terminal::Heard::Event(Heard::Key(key)) => match devices.handle(key) {
+                Reaction::Stay => {}
+                Reaction::Quit => return End::Quit,
+                Reaction::Save { path, overwrite } => {
+                    match devices.document().save(&path, overwrite) {
+                        Ok(()) => devices.saved(&path),
+                        Err(error) => devices.refuse(&error),
+                    }
+                }
+            },
+            terminal::Heard::Event(_) | terminal::Heard::Nothing => {}
+            terminal::Heard::Lost => return End::Lost,
+        }
+    }
+}
