@@ -179,7 +179,7 @@ pub const BINDINGS: &[Binding] = {
         bind(Results, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
         bind(Results, &[Char('q'), Esc], "q", "quit", "quit", A::Quit),
         //
-        bind(Devices, &[Right, Tab], "→ Tab", "next device", "the next device", A::Next),
+        bind(Devices, &[Right, Tab], "←→", "device", "the next device; also Tab", A::Next),
         bind(Devices, &[Left, BackTab], "←", "", "the one before", A::Previous),
         bind(Devices, &[Down], "↓", "", "more of what is to be done", A::Down),
         bind(Devices, &[Up], "↑", "", "back up", A::Up),

@@ -177,7 +177,11 @@ impl View<'_> {
             .filter_map(|(name, is_held)| is_held.then_some(name.as_str()))
             .collect();
         let held = if held.is_empty() { "no button".to_owned() } else { held.join(", ") };
-        let more = if others > 0 { format!("; {others} more pads wait") } else { String::new() };
+        let more = match others {
+            0 => String::new(),
+            1 => "; 1 more pad waits".to_owned(),
+            _ => format!("; {others} more pads wait"),
+        };
         note(pen, 0, 4, pen.width(), &format!("held {held}{more}"), Role::Text);
     }
 
@@ -226,8 +230,8 @@ impl View<'_> {
             &[
                 ("push", format!("{} of the limit", params.push)),
                 ("rise, fall", format!("{} s, {} s", params.rise_s, params.fall_s)),
-                ("a tap lasts", format!("{} s where releases are estimated", params.tap_hold_s)),
-                ("a repeat", format!("{repeat} where they are")),
+                ("a tap", format!("{} s, where releases are guessed", params.tap_hold_s)),
+                ("a repeat", format!("{repeat} there")),
             ],
         );
     }
@@ -289,6 +293,10 @@ impl View<'_> {
         let inside = known.inside().unwrap_or("neither tmux nor screen");
         let program = known.program.as_deref().unwrap_or("");
         let term = known.term.as_deref().unwrap_or("not set");
+        let colours = match known.colours {
+            0..=256 => known.colours.to_string(),
+            _ => "16 million".to_owned(),
+        };
         let no_colour = if known.no_colour { ", but NO_COLOR is set" } else { "" };
         rows(
             pen,
@@ -298,7 +306,7 @@ impl View<'_> {
                 ("size", size + &cell),
                 ("key releases", yes(known.key_releases).to_owned()),
                 ("mouse pixels", yes(known.has_pixels()).to_owned()),
-                ("colours", format!("{}{no_colour}", known.colours)),
+                ("colours", colours + no_colour),
                 ("one frame", format!("{} (synchronised update)", yes(known.synchronised))),
                 ("pointer", format!("its shape can be set: {}", yes(known.pointer_shape))),
                 ("UTF-8", yes(terminal.utf8).to_owned()),
