@@ -1,9 +1,21 @@
 //! Hands on the mouse.
+//!
+//! The terminal's one reader feeds the [`Pointer`], and the [`Mouse`] samples it at each tick;
+//! both must use the same clock. The pointer ends at the screen's edge, and with it its
+//! velocity.
+
+mod pointer;
 
 use serde::{Deserialize, Serialize};
 
-use super::shaping::Shape;
+pub use pointer::{Grid, Pointer};
+
+use super::shaping::{Shape, Shaper};
+use super::{Badge, News, Operator, Practice, View};
 use crate::check::{Check, Checker};
+use crate::clock::{Clock, WallClock};
+use crate::random::Place;
+use crate::signal::{Action, Intent, Seconds, State};
 
 /// What of the pointer steers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -76,5 +88,208 @@ impl Check for Params {
         c.range("spring", self.spring, 0.0..=1000.0);
         c.range("damper", self.damper, 0.0..=1000.0);
         self.shape.check(&mut c.section("shape"));
+    }
+}
+
+impl Params {
+    /// The deflection that `pointer` stands for at `now`, −1 to 1; 0 before its first event.
+    #[must_use]
+    pub fn deflection(&self, pointer: &Pointer, now: Seconds) -> f64 {
+        match self.steer {
+            Steer::Velocity => {
+                let velocity = pointer.velocity(self.along, now, Seconds(self.window_s));
+                (velocity / self.full_speed_screens_s).clamp(-1.0, 1.0)
+            }
+            Steer::Position => pointer.place(self.along).unwrap_or(0.0),
+        }
+    }
+
+    /// The part of the largest action, −1 to 1, that draws a plant in `state` to `target`. The
+    /// first two numbers of every task's state are a position and its rate: the cart's in
+    /// balance and swing-up, m; the ball's in speed-up, m, which a motor turns the beam for, so
+    /// that it wants a soft spring; the car's in mountain car, whose valley lies left of 0.
+    fn pull(&self, target: f64, state: &State) -> f64 {
+        let &[position, rate, ..] = &state[..] else { return 0.0 };
+        let pull = self.spring * (target - position) - self.damper * rate;
+        if pull.is_nan() { 0.0 } else { pull.clamp(-1.0, 1.0) }
+    }
+}
+
+/// The operator at the mouse: the [`Pointer`], sampled at each tick.
+#[derive(Clone, Debug)]
+pub struct Mouse {
+    pointer: Pointer,
+    clock: WallClock,
+    params: Params,
+    /// The largest action.
+    limit: f64,
+    /// Makes an action of a velocity, or a target of a position.
+    shaper: Shaper,
+    badge: Badge,
+    /// The grid that the badge tells of.
+    told: Option<Grid>,
+}
+
+impl Mouse {
+    /// The mouse that moves `pointer`, whose events carry times of `clock`, for ticks of `tick`
+    /// and actions up to ± `limit`.
+    #[must_use]
+    pub fn new(
+        pointer: Pointer,
+        clock: WallClock,
+        params: &Params,
+        limit: f64,
+        tick: Seconds,
+    ) -> Self {
+        let full = match params.steer {
+            Steer::Velocity => limit,
+            Steer::Position => params.reach,
+        };
+        let shaper = Shaper::new(params.shape, full, tick);
+        let badge = Badge::new("mouse");
+        let mut mouse =
+            Self { pointer, clock, params: params.clone(), limit, shaper, badge, told: None };
+        mouse.tell();
+        mouse
+    }
+
+    /// What the mouse says of itself.
+    #[must_use]
+    pub fn badge(&self) -> Badge {
+        self.badge.clone()
+    }
+
+    /// Says how finely the pointer is known, and whether it was seen at all.
+    fn tell(&mut self) {
+        let grid = self.pointer.grid();
+        if let Some(grid) = grid.filter(|_| grid != self.told) {
+            self.badge.say(format!("mouse, {grid}"));
+            self.told = Some(grid);
+        }
+        let is_seen = self.pointer.last_event().is_some();
+        self.badge.set_state(if is_seen { "" } else { "not moved yet" });
+    }
+
+    /// The action at `now`, and the deflection that it comes from.
+    fn steer(&mut self, state: &State, now: Seconds) -> (f64, f64) {
+        let raw = self.params.deflection(&self.pointer, now);
+        let shaped = self.shaper.shape(raw);
+        let action = match self.params.steer {
+            Steer::Velocity => shaped,
+            // A pointer that nobody saw yet draws nowhere.
+            Steer::Position if self.pointer.last_event().is_none() => 0.0,
+            Steer::Position => self.limit * self.params.pull(shaped, state),
+        };
+        (action, raw)
+    }
+}
+
+impl Operator for Mouse {
+    /// A mouse that moves through the countdown goes on moving.
+    fn begin(&mut self, _place: Place, _practice: Practice) {}
+
+    fn news(&mut self, _now: Seconds) -> Option<News> {
+        self.tell();
+        None
+    }
+
+    fn intent(&mut self, view: View<'_>) -> Intent {
+        let now = self.clock.now();
+        let age = self.pointer.last_event().map_or(0.0, |at| (now - at).0.max(0.0));
+        let (action, raw) = self.steer(view.state, now);
+        Intent::Present { action: Action(action), raw: Some(raw), age: Seconds(age) }
+    }
+
+    fn tune(&mut self, sensitivity: f64) {
+        self.shaper.set_sensitivity(sensitivity);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TICK: Seconds = Seconds(0.02);
+
+    fn mouse(params: &Params) -> Mouse {
+        let pointer = Pointer::default();
+        pointer.set_grid(Some(Grid::of(101, 101, None)));
+        Mouse::new(pointer, WallClock::start(), params, 10.0, TICK)
+    }
+
+    fn still() -> State {
+        State::from_slice(&[0.0; 4]).unwrap()
+    }
+
+    #[test]
+    fn an_unseen_mouse_is_present_and_idle_in_either_way() {
+        for steer in [Steer::Velocity, Steer::Position] {
+            let mut mouse = mouse(&Params { steer, ..Params::default() });
+            let away = State::from_slice(&[0.4, 0.1, 0.0, 0.0]).unwrap();
+            let view = View { state: &away, now: Seconds(0.0), rollout_time: Seconds(0.0) };
+            let intent = mouse.intent(view);
+            assert_eq!((intent.action(), intent.raw()), (Action(0.0), Some(0.0)));
+            assert_eq!(
+                mouse.badge().words_now(),
+                "mouse, pointer in cells (101 × 101), not moved yet"
+            );
+            mouse.pointer.moves_to(50, 50, mouse.clock.now());
+            mouse.news(Seconds(0.0));
+            assert_eq!(mouse.badge().words_now(), "mouse, pointer in cells (101 × 101)");
+        }
+    }
+
+    #[test]
+    fn velocity_is_the_force_and_sensitivity_turns_it() {
+        let mut mouse = mouse(&Params { full_speed_screens_s: 2.0, ..Params::default() });
+        for k in 0..=10_u16 {
+            mouse.pointer.moves_to(50 + k, 50 - k, Seconds(f64::from(k) * 0.01));
+        }
+        // A hundredth of the screen in 0.01 s.
+        let (action, raw) = mouse.steer(&still(), Seconds(0.1));
+        assert!((raw - 0.5).abs() < 1e-9 && (action - 5.0).abs() < 1e-6, "{raw} {action}");
+        mouse.tune(0.5);
+        assert!((mouse.steer(&still(), Seconds(0.1)).0 - 2.5).abs() < 1e-6);
+        assert_eq!(mouse.steer(&still(), Seconds(1.0)), (0.0, 0.0));
+        mouse.params.along = Along::Vertical;
+        assert!((mouse.steer(&still(), Seconds(0.1)).1 - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn position_draws_the_plant_there_by_a_spring_and_a_damper() {
+        let params = Params {
+            steer: Steer::Position,
+            reach: 2.0,
+            spring: 0.5,
+            damper: 0.25,
+            ..Params::default()
+        };
+        let mut mouse = mouse(&params);
+        mouse.pointer.moves_to(75, 50, Seconds(0.0));
+        // Half the way to the edge is 1 m.
+        assert_eq!(mouse.steer(&still(), Seconds(9.0)), (5.0, 0.5));
+        let moving = State::from_slice(&[0.5, 1.0, 0.0, 0.0]).unwrap();
+        assert_eq!(mouse.steer(&moving, Seconds(9.0)), (0.0, 0.5));
+        let far = State::from_slice(&[-90.0, 0.0]).unwrap();
+        assert_eq!(mouse.steer(&far, Seconds(9.0)).0, 10.0);
+        let lost = State::from_slice(&[f64::NAN, 0.0]).unwrap();
+        assert_eq!(mouse.steer(&lost, Seconds(9.0)).0, 0.0);
+        assert_eq!(mouse.steer(&State::default(), Seconds(9.0)).0, 0.0);
+    }
+
+    /// A spring and a damper on a mass settle where the pointer is.
+    #[test]
+    fn a_mass_comes_to_rest_at_the_pointer() {
+        let params = Params { steer: Steer::Position, ..Params::default() };
+        let mut mouse = mouse(&params);
+        mouse.pointer.moves_to(80, 50, Seconds(0.0));
+        let (mut x, mut v) = (0.0, 0.0);
+        for _ in 0..1000 {
+            let state = State::from_slice(&[x, v]).unwrap();
+            let (force, _) = mouse.steer(&state, Seconds(1.0));
+            v += force * TICK.0;
+            x += v * TICK.0;
+        }
+        assert!((x - 0.6).abs() < 1e-6 && v.abs() < 1e-6, "{x} {v}");
     }
 }

@@ -7,11 +7,12 @@ mod hold;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseEvent};
 use serde::{Deserialize, Serialize};
 
 pub use hold::{Direction, Hold, KeyReleases, Timing};
 
+use super::mouse::Pointer;
 use super::shaping::{Shape, Shaper};
 use super::{Badge, News, Operator, Practice, View};
 use crate::check::{Check, Checker};
@@ -67,13 +68,22 @@ impl Check for Params {
 #[derive(Clone, Debug)]
 pub struct Hands {
     hold: Arc<Mutex<Hold>>,
+    /// What lies between the person's terminal and this program.
+    inside: Option<&'static str>,
 }
 
 impl Hands {
     /// Hands that touch no key.
     #[must_use]
     pub fn new(params: &Params) -> Self {
-        Self { hold: Arc::new(Mutex::new(Hold::new(timing(params)))) }
+        Self { hold: Arc::new(Mutex::new(Hold::new(timing(params)))), inside: None }
+    }
+
+    /// The same hands, at a terminal within tmux or screen, which may swallow releases.
+    #[must_use]
+    pub const fn inside(mut self, between: Option<&'static str>) -> Self {
+        self.inside = between;
+        self
     }
 
     /// Lets all keys go and from now on keeps the times of `params`.
@@ -130,6 +140,16 @@ impl Hands {
         self.hold().knowledge()
     }
 
+    /// How releases are known, in words for the person, and how late they may be.
+    #[must_use]
+    pub fn release_words(&self) -> (String, String) {
+        let hold = self.hold();
+        let known = hold.knowledge().words();
+        let Some(late) = hold.lateness() else { return (known.to_owned(), String::new()) };
+        let inside = self.inside.map_or(String::new(), |inside| format!(" inside {inside}"));
+        (format!("{known}{inside}"), format!("up to {:.0} ms late", late.0 * 1000.0))
+    }
+
     /// The time of the last steering key's event, if there was one.
     #[must_use]
     pub fn last_event(&self) -> Option<Seconds> {
@@ -157,6 +177,11 @@ fn timing(params: &Params) -> Timing {
     }
 }
 
+/// Feeds `pointer` with a mouse event, whose time is `now`; a button moves nothing.
+pub fn point(pointer: &Pointer, event: &MouseEvent, now: Seconds) {
+    pointer.moves_to(event.column, event.row, now);
+}
+
 /// The direction of a steering key: arrows, h/l, a/d; stop is down or s.
 #[must_use]
 pub fn direction(key: &KeyEvent) -> Option<Direction> {
@@ -181,8 +206,8 @@ pub struct Keyboard {
     push: f64,
     shaper: Shaper,
     badge: Badge,
-    /// How releases are known, as far as the badge says it.
-    told: Option<KeyReleases>,
+    /// What the badge says of releases.
+    told: (String, String),
 }
 
 impl Keyboard {
@@ -192,7 +217,8 @@ impl Keyboard {
     pub fn new(hands: Hands, clock: WallClock, params: &Params, limit: f64, tick: Seconds) -> Self {
         let shaper = Shaper::new(params.shape, limit, tick);
         let badge = Badge::default();
-        let mut keyboard = Self { hands, clock, push: params.push, shaper, badge, told: None };
+        let told = Default::default();
+        let mut keyboard = Self { hands, clock, push: params.push, shaper, badge, told };
         keyboard.tell();
         keyboard
     }
@@ -205,10 +231,11 @@ impl Keyboard {
 
     /// Says how releases are known, if that is new.
     fn tell(&mut self) {
-        let known = self.hands.knowledge();
-        if self.told != Some(known) {
-            self.told = Some(known);
-            self.badge.say(format!("keyboard, releases {}", known.words()));
+        let words = self.hands.release_words();
+        if self.told != words {
+            self.badge.say(format!("keyboard, releases {}", words.0));
+            self.badge.set_state(&words.1);
+            self.told = words;
         }
     }
 }
@@ -255,6 +282,25 @@ mod tests {
         assert_eq!(keyboard.intent(view).action(), Action(-5.0));
         hands.release_all();
         assert_eq!(keyboard.intent(view).action(), Action(0.0));
+    }
+
+    #[test]
+    fn the_badge_says_how_late_estimated_releases_are_and_where_they_were_lost() {
+        let params = Params::default();
+        let hands = Hands::new(&params).inside(Some("tmux"));
+        let clock = WallClock::start();
+        let mut keyboard = Keyboard::new(hands.clone(), clock, &params, 10.0, Seconds(0.02));
+        let badge = keyboard.badge();
+        assert_eq!(badge.words(), "keyboard, releases estimated from key repeats inside tmux");
+        assert!(badge.words_now().ends_with("inside tmux, up to 120 ms late"));
+        for k in 0..20 {
+            hands.press(Direction::Left, Seconds(f64::from(k) * 0.04));
+        }
+        keyboard.news(Seconds(0.0));
+        assert!(badge.words_now().ends_with(", up to 64 ms late"), "{}", badge.words_now());
+        hands.set_releases_known(true);
+        keyboard.news(Seconds(0.0));
+        assert_eq!(badge.words_now(), "keyboard, releases reported by the terminal");
     }
 
     #[test]

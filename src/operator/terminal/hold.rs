@@ -122,6 +122,12 @@ impl Hold {
         }
     }
 
+    /// How late it may be known that a key was let go; `None` where that is reported.
+    #[must_use]
+    pub fn lateness(&self) -> Option<Seconds> {
+        (self.releases == KeyReleases::Estimated).then(|| Seconds(self.repeat_hold()))
+    }
+
     /// The time of the last key event, if there was one.
     #[must_use]
     pub fn last_event(&self) -> Option<Seconds> {
@@ -386,7 +392,166 @@ mod tests {
         assert_eq!(hold.push(at(5.0)), -1.0);
     }
 
+    /// What can happen to the keys.
+    #[derive(Clone, Copy, Debug)]
+    enum Happening {
+        Press(Direction),
+        Repeat(Direction),
+        Release(Direction),
+        FocusLost,
+        Knows(KeyReleases),
+    }
+
+    use Happening::{FocusLost, Knows, Press, Release, Repeat};
+
+    const HAPPENINGS: [Happening; 12] = [
+        Press(Left),
+        Press(Right),
+        Press(Stop),
+        Repeat(Left),
+        Repeat(Right),
+        Repeat(Stop),
+        Release(Left),
+        Release(Right),
+        Release(Stop),
+        FocusLost,
+        Knows(KeyReleases::Reported),
+        Knows(KeyReleases::Estimated),
+    ];
+
+    /// Longer than any estimated key pushes.
+    const SILENCE: f64 = 0.2;
+
+    fn happen(hold: &mut Hold, happening: Happening, now: f64) {
+        match happening {
+            Press(key) => hold.press(key, at(now)),
+            Repeat(key) => hold.repeat(key, at(now)),
+            Release(key) => hold.release(key, at(now)),
+            FocusLost => hold.release_all(),
+            Knows(releases) => hold.set_knowledge(releases),
+        }
+    }
+
+    /// The keys that a person holds after `happenings`, if the terminal tells all of it.
+    fn held_after(happenings: &[Happening]) -> Vec<Direction> {
+        let mut held = Vec::new();
+        for happening in happenings {
+            match *happening {
+                Press(key) | Repeat(key) if !held.contains(&key) => held.push(key),
+                Release(key) => held.retain(|other| *other != key),
+                FocusLost => held.clear(),
+                _ => {}
+            }
+        }
+        held
+    }
+
+    /// After `happenings`, each as long after the last as `waits` say, and every key let go in
+    /// either order or silent for long: no push is left.
+    fn leaves_nothing(
+        timing: Timing,
+        happenings: &[Happening],
+        waits: &[f64],
+    ) -> Result<(), String> {
+        let mut hold = Hold::new(timing);
+        let mut now = 0.0;
+        for (happening, wait) in happenings.iter().zip(waits) {
+            now += wait;
+            happen(&mut hold, *happening, now);
+            let push = hold.push(at(now));
+            if push.is_nan() || push.abs() > 1.0 {
+                return Err(format!("a push of {push}"));
+            }
+        }
+        let silent = now + SILENCE + timing.fall_s;
+        if hold.knowledge() == KeyReleases::Estimated && hold.push(at(silent)) != 0.0 {
+            return Err(format!("{} after silence", hold.push(at(silent))));
+        }
+        let mut held = held_after(happenings);
+        for _ in 0..2 {
+            let mut hold = hold.clone();
+            for key in &held {
+                hold.release(*key, at(now));
+            }
+            // Without a release, and nothing held, it is still estimated.
+            let known = hold.knowledge() == KeyReleases::Reported;
+            let push = hold.push(at(if known { now + timing.fall_s } else { silent }));
+            if push != 0.0 {
+                return Err(format!("{push} after all releases"));
+            }
+            held.reverse();
+        }
+        Ok(())
+    }
+
+    /// Every number of `digits` digits to the base of `choices`.
+    fn all(choices: usize, digits: u32) -> impl Iterator<Item = Vec<usize>> {
+        (0..choices.pow(digits)).map(move |number| {
+            (0..digits).map(|digit| number / choices.pow(digit) % choices).collect()
+        })
+    }
+
+    #[test]
+    fn no_short_order_of_events_leaves_a_push_behind() {
+        // At once, within a tap, as a repeat that is late, after a tap.
+        let steps = [0.0, 0.04, 0.11, 0.3];
+        for (length, fall_s) in [(1, 0.0), (2, 0.1), (3, 0.0), (3, 0.1), (4, 0.0)] {
+            let timing = Timing { fall_s, ..TIMING };
+            for order in all(HAPPENINGS.len(), length) {
+                let happenings: Vec<_> = order.iter().map(|which| HAPPENINGS[*which]).collect();
+                for waits in all(if length < 4 { steps.len() } else { 2 }, length) {
+                    let waits: Vec<_> = waits.iter().map(|which| steps[*which]).collect();
+                    let left = leaves_nothing(timing, &happenings, &waits);
+                    assert_eq!(left, Ok(()), "{happenings:?} {waits:?} {timing:?}");
+                }
+            }
+        }
+    }
+
+    /// Where the terminal tells all, the push is that of the key pressed last of those held;
+    /// a stop or a lost focus lets all go until the next press.
+    #[test]
+    fn reported_keys_push_as_they_are_held_in_every_short_order() {
+        let told: Vec<Happening> = HAPPENINGS[..10].to_vec();
+        for order in all(told.len(), 5) {
+            let mut hold = Hold::new(TIMING);
+            hold.set_knowledge(KeyReleases::Reported);
+            // The keys that push, the last one first to be heard.
+            let mut pushing: Vec<Direction> = Vec::new();
+            for which in &order {
+                match told[*which] {
+                    Press(Stop) | Repeat(Stop) | FocusLost => pushing.clear(),
+                    Press(key) => {
+                        pushing.retain(|other| *other != key);
+                        pushing.push(key);
+                    }
+                    Release(key) => pushing.retain(|other| *other != key),
+                    Repeat(_) | Knows(_) => {}
+                }
+                happen(&mut hold, told[*which], 0.0);
+                let expected = match pushing.last() {
+                    Some(Left) => -1.0,
+                    Some(Right) => 1.0,
+                    _ => 0.0,
+                };
+                assert_eq!(hold.push(at(0.0)), expected, "{order:?}");
+            }
+        }
+    }
+
     proptest! {
+        #[test]
+        fn no_long_order_of_events_leaves_a_push_behind(
+            (rise_s, fall_s) in (0.0..0.3_f64, 0.0..0.3_f64),
+            repeat_hold_s in proptest::option::of(0.02..0.2_f64),
+            events in proptest::collection::vec((0..12_usize, 0.0..0.3_f64), 0..80),
+        ) {
+            let timing = Timing { rise_s, fall_s, repeat_hold_s, ..TIMING };
+            let (order, waits): (Vec<_>, Vec<_>) = events.into_iter().unzip();
+            let happenings: Vec<_> = order.into_iter().map(|which| HAPPENINGS[which]).collect();
+            prop_assert_eq!(leaves_nothing(timing, &happenings, &waits), Ok(()));
+        }
+
         #[test]
         fn keys_that_all_end_released_leave_0(
             known in any::<bool>(),
