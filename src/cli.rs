@@ -43,6 +43,8 @@ pub enum Command {
     Fit(Fit),
     /// A plant open loop: a table of actions in, a table of states out.
     Simulate(Simulate),
+    /// This computer's gamepad for a session at another: lines on standard output.
+    PadRelay(PadRelay),
     /// Look at profiles.
     #[command(subcommand)]
     Profile(Profile),
@@ -68,7 +70,8 @@ pub struct Run {
     /// rfwr or lwpr.
     #[arg(long, value_name = "LEARNER")]
     pub learner: Option<String>,
-    /// `keyboard`, `script:FILE|SESSION`, `simulated:naive|average|expert[:TYPE]` or `none`.
+    /// `keyboard`, `gamepad[:relay=-|:relay=unix:PATH|:script=FILE]`, `mouse`,
+    /// `script:FILE|SESSION`, `simulated:naive|average|expert[:TYPE]` or `none`.
     #[arg(long, value_name = "OPERATOR", default_value = "keyboard")]
     pub operator: String,
     /// simulated.
@@ -199,6 +202,25 @@ pub struct Simulate {
     /// Change a value of the profile, such as `plant.pole_length_m=0.6`.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
+}
+
+const RELAY_EXAMPLES: &str = "\
+The pad is at this computer, the session at LAB-PC:
+  LAB-PC:  coadapt run balance --operator gamepad:relay=unix:/tmp/pad
+  here:    coadapt pad-relay | ssh LAB-PC coadapt pad-relay --forward unix:/tmp/pad
+The session is here, the pad at LAPTOP:
+  ssh LAPTOP coadapt pad-relay | coadapt run balance --operator gamepad:relay=-";
+
+/// The words of `pad-relay`.
+#[derive(Args, Debug)]
+#[command(after_help = RELAY_EXAMPLES)]
+pub struct PadRelay {
+    /// Pass a relay's lines on from standard input to the session at this socket.
+    #[arg(long, value_name = "unix:PATH")]
+    pub forward: Option<String>,
+    /// Relay a table of events in place of a pad: columns t,event,pad,what,value.
+    #[arg(long, value_name = "FILE", conflicts_with = "forward")]
+    pub events: Option<PathBuf>,
 }
 
 /// The words of `profile`.

@@ -10,7 +10,7 @@ pub mod simulated;
 pub mod terminal;
 
 pub use badge::Badge;
-pub use choice::{Choice, Device, Params, UnknownOperator, Via};
+pub use choice::{Choice, Device, Params, UnknownOperator, Via, socket_path};
 
 use crate::random::Place;
 use crate::signal::{Action, End, Intent, Seconds, State};

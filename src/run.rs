@@ -5,6 +5,7 @@ mod devices;
 mod evaluate;
 mod fit;
 pub mod outcome;
+mod pad_relay;
 mod screen;
 pub mod session;
 mod shutdown;
@@ -67,6 +68,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Evaluate(words)) => evaluate::evaluate(words),
         Some(Command::Fit(words)) => fit::fit(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
+        Some(Command::PadRelay(words)) => pad_relay::pad_relay(words),
         Some(Command::Profile(profile)) => words::profile(profile),
         Some(Command::Devices(words)) => devices::devices(words),
     }

@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a screen that cannot be drawn has failed its test")]
 
 use coadapt::control::snapshot::Snapshot;
+use coadapt::operator::Device;
 use coadapt::profile::Document;
 use coadapt::record::EpisodeRow;
 use coadapt::report::achieved::yardstick;
@@ -62,7 +63,9 @@ fn info() -> Info {
         regions: None,
         field_cap: 100,
         operator: "keyboard, releases reported".to_owned(),
-        sensitivity: Some(1.0),
+        device_state: String::new(),
+        device: Some(Device::Keyboard),
+        sensitivity: 1.0,
     }
 }
 

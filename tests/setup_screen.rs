@@ -167,7 +167,10 @@ fn the_focus_is_seen_without_colour() {
     let look = Look { palette: Palette::Plain, ..Look::default() };
     for field in Field::ALL.into_iter().filter(|f| !matches!(f, Field::Task | Field::Unfinished)) {
         match field {
-            Field::Skill | Field::Script => {
+            Field::Skill => {
+                desk.go(Field::Operator).right(3);
+            }
+            Field::Script => {
                 desk.go(Field::Operator).right(1);
             }
             Field::Policy => {
@@ -209,7 +212,7 @@ fn a_wrong_subject_is_told_at_once_and_does_not_begin() {
 fn sequential_for_a_duration() {
     let mut desk = Desk::nowhere();
     desk.go(Field::Mode).right(1).go(Field::Main).type_text("420s");
-    desk.go(Field::Operator).right(1).go(Field::Kind).right(2);
+    desk.go(Field::Operator).right(3).go(Field::Kind).right(2);
     insta::assert_snapshot!("setup_sequential_duration", desk.picture());
     let order = desk.begin();
     assert_eq!(order.operator, "simulated:average:bang-bang");
@@ -329,7 +332,7 @@ fn a_task_brings_its_plain_profile_and_keeps_who_and_how() {
     let mut desk = Desk::nowhere();
     desk.go(Field::Subject).type_text("S07");
     desk.go(Field::Seed).type_text("42");
-    desk.go(Field::Operator).right(1);
+    desk.go(Field::Operator).right(3);
     for (task, name) in [(1, "swing_up"), (2, "speed_up"), (3, "mountain_car")] {
         desk.go(Field::Task).right(1);
         let command = desk.setup.order().command_line();
@@ -431,7 +434,7 @@ fn letters_type_in_a_text_and_are_commands_elsewhere() {
 #[test]
 fn a_long_command_is_shown_whole_in_turns() {
     let mut desk = Desk::nowhere();
-    desk.go(Field::Operator).right(2).go(Field::Script).type_text(&"long/".repeat(60));
+    desk.go(Field::Operator).right(4).go(Field::Script).type_text(&"long/".repeat(60));
     let look = Look::default();
     let mut shown = String::new();
     for turn in 0..4 {

@@ -11,7 +11,7 @@ use crate::session::machine::{self, Effect, Event, Stage};
 use crate::session::plan::Start;
 use crate::session::{Moment, Phase};
 use crate::sharing::Sharing;
-use crate::signal::{End, State};
+use crate::signal::{End, Intent, State};
 
 impl<W: Witness> Cycle<W> {
     /// Lets `event` happen to the session, and carries out what follows.
@@ -303,6 +303,7 @@ impl<W: Witness> Cycle<W> {
         let is_steered = self.stage.moment().is_some_and(|moment| moment.phase.is_steered());
         let is_due = matches!(self.stage, Stage::Running(_) | Stage::Hold { .. });
         if is_steered && is_due && self.crew.operator.is_gone() {
+            self.seen.human = Intent::Absent;
             self.happen(Event::Pause);
         }
         let waits = matches!(self.stage, Stage::Paused(_) | Stage::Stopped(_));

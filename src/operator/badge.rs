@@ -43,15 +43,10 @@ impl Badge {
         self.signs().words.clone()
     }
 
-    /// The same, and how the device does at the moment.
+    /// How the device does at the moment; mostly empty.
     #[must_use]
-    pub fn words_now(&self) -> String {
-        let signs = self.signs();
-        if signs.state.is_empty() {
-            signs.words.clone()
-        } else {
-            format!("{}, {}", signs.words, signs.state)
-        }
+    pub fn state(&self) -> String {
+        self.signs().state.clone()
     }
 
     /// What is wrong and what to do about it; `None` while all is well.

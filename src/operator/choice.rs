@@ -138,12 +138,9 @@ impl FromStr for Choice {
             None if words == "mouse" => Ok(Self::Mouse),
             Some(("gamepad", via)) => match via.split_once('=') {
                 Some(("relay", "-")) => Ok(Self::Gamepad(Via::RelayInput)),
-                Some(("relay", path)) => match path.strip_prefix("unix:") {
-                    Some(path) if !path.is_empty() => {
-                        Ok(Self::Gamepad(Via::RelaySocket(path.into())))
-                    }
-                    _ => Err(UnknownOperator::Operator(words.to_owned())),
-                },
+                Some(("relay", socket)) => socket_path(socket)
+                    .map(|path| Self::Gamepad(Via::RelaySocket(path)))
+                    .ok_or_else(|| UnknownOperator::Operator(words.to_owned())),
                 Some(("script", file)) if !file.is_empty() => {
                     Ok(Self::Gamepad(Via::Script(file.into())))
                 }
@@ -160,6 +157,12 @@ impl FromStr for Choice {
             _ => Err(UnknownOperator::Operator(words.to_owned())),
         }
     }
+}
+
+/// The path of a socket that is written as `unix:PATH`.
+#[must_use]
+pub fn socket_path(socket: &str) -> Option<PathBuf> {
+    socket.strip_prefix("unix:").filter(|path| !path.is_empty()).map(PathBuf::from)
 }
 
 impl fmt::Display for Choice {

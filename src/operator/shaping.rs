@@ -46,8 +46,12 @@ impl Check for Shape {
     fn check(&self, c: &mut Checker<'_>) {
         c.range("dead_zone", self.dead_zone, 0.0..=0.95);
         c.range("outer_zone", self.outer_zone, 0.0..=0.95);
+        let zones = 0.0..=0.95;
         c.demand(
-            self.dead_zone + self.outer_zone < 1.0,
+            // One that is beyond its own range is told already.
+            self.dead_zone + self.outer_zone < 1.0
+                || !zones.contains(&self.dead_zone)
+                || !zones.contains(&self.outer_zone),
             "outer_zone",
             self.outer_zone,
             "less than 1 together with dead_zone, or nothing is left between rest and full",

@@ -15,10 +15,10 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::cli;
 use crate::clock::WallClock;
-use crate::operator::Choice;
 use crate::operator::terminal::{self, Hands};
+use crate::operator::{Choice, Via};
 use crate::profile::{self, Document, Order, ProfileError};
-use crate::record::folder;
+use crate::record::{self, folder};
 use crate::session::Phase;
 use crate::session::plan::Plan;
 use crate::sharing::{self, Mode};
@@ -29,7 +29,7 @@ use crate::tui::live::Info;
 use crate::tui::results;
 use crate::tui::scene::{self, Scene};
 use crate::tui::setup::Shelf;
-use crate::tui::terminal::{Feed, Screen, give_back, is_taken};
+use crate::tui::terminal::{Feed, KeysFrom, Screen, give_back, is_taken};
 
 /// The folder of local profiles.
 const PROFILES: &str = "profiles";
@@ -43,6 +43,7 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
     let feed = Feed::new(Hands::new(&terminal::Params::default()), clock);
     let mut stage =
         Stage { feed: feed.clone(), shutdown: Shutdown::listen(), running: None, last: None };
+    let keys = keys_of(run);
     // Everything that could be refused is refused before the screen is taken.
     let start = match run {
         None => {
@@ -52,7 +53,7 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
         }
         Some(run) => {
             // Without a terminal no folder is made.
-            Screen::check().map_err(|error| RunError::Usage(error.to_string()))?;
+            Screen::check(keys).map_err(|error| RunError::Usage(error.to_string()))?;
             let started = match &run.resume {
                 Some(folder) => stage.take_up(folder)?,
                 None => stage
@@ -62,7 +63,7 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
         }
     };
     keep_panics_off_the_screen();
-    let mut screen = match Screen::take(feed) {
+    let mut screen = match Screen::take(feed, keys) {
         Ok(screen) => screen,
         Err(error) => {
             stage.stop();
@@ -97,6 +98,19 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
         (_, Some(finished)) => exit_code(finished),
         (_, None) => ExitCode::SUCCESS,
     })
+}
+
+/// Where keys come from while standard input may hold a relay's lines.
+fn keys_of(run: Option<&cli::Run>) -> KeysFrom {
+    let words = run.map(|run| match &run.resume {
+        Some(folder) => record::read_sidecar(&folder.join("session.json"))
+            .map_or(String::new(), |session| session.operator),
+        None => run.operator.clone(),
+    });
+    match words.and_then(|words| words.parse().ok()) {
+        Some(Choice::Gamepad(Via::RelayInput)) => KeysFrom::Terminal,
+        _ => KeysFrom::Input,
+    }
 }
 
 /// A panic may say its words only after the terminal was given back.
@@ -250,6 +264,7 @@ fn info(session: &Session) -> Info {
     let (profile, sidecar) = (session.profile(), session.sidecar());
     let task = profile.experiment.task(profile.tick());
     let plan = Plan::new(&profile.session, profile.tick(), sidecar.seed, true);
+    let device = sidecar.operator.parse().ok().and_then(|choice: Choice| choice.device());
     let texts = &profile.session.instructions;
     let main = match sidecar.mode {
         Mode::Simultaneous => &texts.simultaneous,
@@ -287,12 +302,9 @@ fn info(session: &Session) -> Info {
         regions: scene::regions_of(&profile.experiment),
         field_cap: profile.learner.max_fields,
         operator: sidecar.operator.clone(),
-        sensitivity: sidecar
-            .operator
-            .parse::<Choice>()
-            .ok()
-            .and_then(|choice| choice.device())
-            .map(|device| profile.operator.shape(device).sensitivity),
+        device_state: String::new(),
+        device,
+        sensitivity: device.map_or(1.0, |device| profile.operator.shape(device).sensitivity),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The pages between phases: what comes next, in words, and the break before it.
 
 use super::help;
-use super::keys::Screen;
+use super::keys::{Hand, Screen};
 use super::live::{View, phase_word, strip};
 use super::palette::Role;
 use super::pen::Pen;
@@ -25,7 +25,7 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
         Stage::Break { next, ticks_left } => rest(pen, view, next, ticks_left),
         _ => {}
     }
-    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Briefing, true));
+    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Briefing, Hand::Absent));
 }
 
 fn instruction(pen: &mut Pen<'_>, view: &View<'_>, moment: Moment) {

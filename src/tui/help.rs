@@ -1,6 +1,6 @@
 //! The keys and the few facts that the screen has no room for.
 
-use super::keys::{self, Screen};
+use super::keys::{self, Hand, Screen};
 use super::palette::Role;
 use super::pen::{Pen, columns};
 use super::text::wrapped;
@@ -36,10 +36,10 @@ pub fn draw(pen: &mut Pen<'_>, screen: Screen, notes: &[String]) {
     }
 }
 
-/// The line of keys at the bottom of `screen`, in row `y`; `steered`: by a person.
-pub fn hints(pen: &mut Pen<'_>, y: u16, screen: Screen, steered: bool) {
+/// The line of keys at the bottom of `screen`, in row `y`, for `hand`.
+pub fn hints(pen: &mut Pen<'_>, y: u16, screen: Screen, hand: Hand) {
     let mut x = 1;
-    for (key, word) in keys::hints(screen, steered) {
+    for (key, word) in keys::hints(screen, hand) {
         if x + columns(key) + 1 + columns(word) > pen.width() {
             break;
         }
@@ -51,13 +51,14 @@ pub fn hints(pen: &mut Pen<'_>, y: u16, screen: Screen, steered: bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::operator::Device;
 
     #[test]
     fn the_line_of_keys_fits_the_smallest_screen() {
-        for (screen, steered) in Screen::ALL.into_iter().flat_map(|s| [(s, true), (s, false)]) {
-            let length: u16 = keys::hints(screen, steered)
-                .map(|(key, word)| columns(key) + columns(word) + 3)
-                .sum();
+        let hands = [Hand::On(Device::Keyboard), Hand::On(Device::Gamepad), Hand::Nobody];
+        for (screen, hand) in Screen::ALL.into_iter().flat_map(|s| hands.map(|hand| (s, hand))) {
+            let length: u16 =
+                keys::hints(screen, hand).map(|(key, word)| columns(key) + columns(word) + 3).sum();
             assert!(length > 0 && length - 2 < 80, "{}: {length}", screen.word());
         }
     }

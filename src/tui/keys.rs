@@ -2,6 +2,8 @@
 
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
+use crate::operator::Device;
+
 /// Where a key is pressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Screen {
@@ -169,7 +171,7 @@ pub const BINDINGS: &[Binding] = {
         ),
         bind(Live, &[Char('-')], "-", "", "lower it", A::LessSensitive),
         bind(Live, &[Char('p')], "p", "progress", "show or hide share and success", A::Progress),
-        bind(Live, &[Char('v')], "v", "subject", "the subject's view, or all", A::SubjectView),
+        bind(Live, &[Char('v')], "v", "view", "the subject's view, or all", A::SubjectView),
         bind(Live, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
         bind(Live, &[Char('q')], "q", "end", "end the session (asks once)", A::Quit),
         //
@@ -231,15 +233,32 @@ pub fn of(screen: Screen) -> impl Iterator<Item = &'static Binding> {
     BINDINGS.iter().filter(move |binding| binding.screen == screen)
 }
 
+/// Who steers, as far as the line of keys goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hand {
+    /// A person with this device.
+    On(Device),
+    /// A script or a model of a person.
+    Absent,
+    /// Nobody.
+    Nobody,
+}
+
 /// The line of keys at the bottom of `screen`: pairs of key and word. Where nobody steers
 /// there is nothing to push or discard, where somebody does nothing to hurry.
-pub fn hints(screen: Screen, steered: bool) -> impl Iterator<Item = (&'static str, &'static str)> {
+pub fn hints(screen: Screen, hand: Hand) -> impl Iterator<Item = (&'static str, &'static str)> {
     let fits = move |binding: &&Binding| match binding.action {
-        None | Some(Action::Discard) => steered,
-        Some(Action::Faster) => !steered,
+        None => matches!(hand, Hand::On(_)),
+        Some(Action::Discard) => hand != Hand::Nobody,
+        Some(Action::Faster) => hand == Hand::Nobody,
         Some(_) => true,
     };
-    of(screen).filter(fits).filter(|b| !b.hint.is_empty()).map(|b| (b.shown, b.hint))
+    let shown = move |binding: &Binding| match (binding.action, hand) {
+        (None, Hand::On(Device::Gamepad)) => "stick",
+        (None, Hand::On(Device::Mouse)) => "mouse",
+        _ => binding.shown,
+    };
+    of(screen).filter(fits).filter(|b| !b.hint.is_empty()).map(move |b| (shown(b), b.hint))
 }
 
 #[cfg(test)]

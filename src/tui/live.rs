@@ -8,12 +8,13 @@ pub mod strip;
 
 use ratatui::Frame;
 
-use super::keys::Screen;
+use super::keys::{Hand, Screen};
 use super::palette::{Look, Role};
 use super::pen::Pen;
 use super::scene::{Light, Scene, regions};
 use super::{briefing, help, small};
 use crate::control::snapshot::Snapshot;
+use crate::operator::Device;
 use crate::record::EpisodeRow;
 use crate::report::metrics;
 use crate::session::Phase;
@@ -72,8 +73,12 @@ pub struct Info {
     pub field_cap: u32,
     /// The operator and how it is known, such as "keyboard, releases reported".
     pub operator: String,
-    /// The sensitivity of the operator's device; `None` where there is no device.
-    pub sensitivity: Option<f64>,
+    /// How the operator's device does at the moment, in a few words; mostly none.
+    pub device_state: String,
+    /// The device that the operator's hand is on; `None` where there is none.
+    pub device: Option<Device>,
+    /// Its sensitivity.
+    pub sensitivity: f64,
 }
 
 impl Info {
@@ -194,6 +199,16 @@ impl View<'_> {
         }
     }
 
+    /// Who steers now.
+    #[must_use]
+    pub fn hand(&self) -> Hand {
+        match self.info.device {
+            _ if !self.phase().is_steered() => Hand::Nobody,
+            Some(device) => Hand::On(device),
+            None => Hand::Absent,
+        }
+    }
+
     /// The stage in a few words.
     #[must_use]
     pub fn stage_words(&self) -> String {
@@ -221,7 +236,10 @@ impl View<'_> {
         otherwise: impl FnOnce(&mut Pen<'_>),
     ) {
         let room = usize::from(pen.width().saturating_sub(2));
-        match (self.ui.message.as_ref().or(self.ui.trouble.as_ref()), self.ui.tuned) {
+        // A box says what is wrong already, and its keys are wanted.
+        let has_box = matches!(self.panel.stage, Stage::Paused(_));
+        let trouble = self.ui.trouble.as_ref().filter(|_| !has_box);
+        match (self.ui.message.as_ref().or(trouble), self.ui.tuned) {
             (Some(message), _) => {
                 pen.text(1, y, &super::text::cut(message, room), Role::Alarm);
             }
@@ -284,8 +302,7 @@ fn everything(pen: &mut Pen<'_>, view: &View<'_>) {
     pen.rule(2 + rows);
     panels::draw(&mut pen.part(0, 3 + rows, width, PANEL_ROWS - 2), view);
     let last = height - 1;
-    let steered = view.phase().is_steered();
-    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Live, steered));
+    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Live, view.hand()));
     overlay::draw(&mut pen.part(0, 2, width, rows), view);
 }
 

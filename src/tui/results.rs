@@ -9,7 +9,7 @@ pub use measure::Start;
 
 use ratatui::Frame;
 
-use super::keys::Screen;
+use super::keys::{Hand, Screen};
 use super::palette::{Look, Role};
 use super::pen::{Pen, columns};
 use super::text::{cut, fixed, mean, real, wrapped};
@@ -157,7 +157,7 @@ fn whole(pen: &mut Pen<'_>, info: &Info, state: &State) {
         Some(message) => {
             pen.text(1, last, message, Role::Alarm);
         }
-        None => help::hints(pen, last, Screen::Results, true),
+        None => help::hints(pen, last, Screen::Results, Hand::Absent),
     }
     if state.help_open {
         help::draw(pen, Screen::Results, &[]);

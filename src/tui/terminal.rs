@@ -57,6 +57,16 @@ pub enum NoScreen {
     Io(#[from] io::Error),
 }
 
+/// Where keys come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum KeysFrom {
+    /// Standard input.
+    Input,
+    /// The terminal that the program was started at, since standard input is a pipe with
+    /// something else in it.
+    Terminal,
+}
+
 /// What the reader thread saw.
 #[derive(Debug)]
 pub enum Heard {
@@ -126,8 +136,8 @@ impl Screen {
     ///
     /// # Errors
     /// When there is none, or none that can be drawn on.
-    pub fn check() -> Result<(), NoScreen> {
-        if !io::stdin().is_terminal() {
+    pub fn check(keys: KeysFrom) -> Result<(), NoScreen> {
+        if keys == KeysFrom::Input && !io::stdin().is_terminal() {
             return Err(NoScreen::NoTerminal("input"));
         }
         if !io::stdout().is_terminal() {
@@ -143,8 +153,8 @@ impl Screen {
     ///
     /// # Errors
     /// When there is none, or it refuses.
-    pub fn take(feed: Feed) -> Result<Self, NoScreen> {
-        Self::check()?;
+    pub fn take(feed: Feed, keys: KeysFrom) -> Result<Self, NoScreen> {
+        Self::check(keys)?;
         enable_raw_mode()?;
         TAKEN.store(true, Ordering::SeqCst);
         let mut out = BufWriter::with_capacity(1 << 16, io::stdout());

@@ -13,6 +13,7 @@
 //! that tells pads apart; `what` the pad's name, the axis or the button; `value` an axis'
 //! deflection, −1 to 1. Lines that begin with `#` are passed over.
 
+use std::collections::VecDeque;
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -78,7 +79,7 @@ struct Row {
 
 /// Events with their times, in order.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Events(Vec<(Seconds, Event)>);
+pub struct Events(VecDeque<(Seconds, Event)>);
 
 impl Events {
     /// Reads the table in `file`.
@@ -103,7 +104,7 @@ impl Events {
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
-        let (mut events, mut faults, mut latest) = (Vec::new(), Faults::default(), 0.0);
+        let (mut events, mut faults, mut latest) = (VecDeque::new(), Faults::default(), 0.0);
         let headers = reader.headers().cloned().unwrap_or_default();
         if headers != vec!["t", "event", "pad", "what", "value"] {
             let what = "the first line must be t,event,pad,what,value";
@@ -119,7 +120,7 @@ impl Events {
             match read {
                 Ok((t, event)) => {
                     latest = t;
-                    events.push((Seconds(t), event));
+                    events.push_back((Seconds(t), event));
                 }
                 Err(fault) => faults.0.push(fault),
             }
@@ -128,8 +129,9 @@ impl Events {
     }
 
     /// The events with their times, in order.
-    pub fn into_iter_in_time(self) -> impl Iterator<Item = (Seconds, Event)> {
-        self.0.into_iter()
+    #[must_use]
+    pub fn into_queue(self) -> VecDeque<(Seconds, Event)> {
+        self.0
     }
 }
 
@@ -190,7 +192,7 @@ mod tests {
         let text = "t,event,pad,what,value\n# a comment\n0.0,connect,1,\"Pad, big\",\n\
                     0.5, axis, 1, left_stick_x, -0.3\n0.5,axis,1,code(29),nan\n\
                     2,press,1,start,\n2.1,release,1,code(7),\n3,disconnect,1,,\n";
-        let events: Vec<_> = Events::parse(text).unwrap().into_iter_in_time().collect();
+        let events: Vec<_> = Events::parse(text).unwrap().into_queue().into();
         let pad = Id(1);
         assert!(matches!(&events[0].1, Event::Connected(about) if about.name == "Pad, big"));
         assert_eq!(

@@ -82,7 +82,7 @@ impl Source {
     /// A table of events, in the session's time.
     #[must_use]
     pub fn script(events: Events) -> Self {
-        Self::of(Kind::Script(events.into_iter_in_time().collect()))
+        Self::of(Kind::Script(events.into_queue()))
     }
 
     /// No pad can be heard, for the reason `why`.
@@ -135,9 +135,8 @@ impl Source {
     /// How the link does.
     pub(super) fn words(&self, now: Seconds) -> String {
         let (Some(link), Some(age)) = (self.link(), self.age(now)) else { return String::new() };
-        let Counts { taken, lost, damaged, .. } = link.counts();
-        let all = taken + lost + damaged;
-        format!("relayed, {:.0} ms old, {lost} of {all} lines lost, {damaged} damaged", age.0 * 1e3)
+        let Counts { lost, damaged, .. } = link.counts();
+        format!("relay {:.0} ms old, {lost} lost, {damaged} bad", age.0 * 1e3)
     }
 
     /// Why no events come, and what to do about it.

@@ -123,7 +123,12 @@ impl Page {
             self.panel = scene;
         }
         if let Some(badge) = &self.running.badge {
-            self.running.info.operator = badge.words_now();
+            // A pad that is gone has no words: then the operator's own stay.
+            let words = badge.words();
+            if !words.is_empty() {
+                self.running.info.operator = words;
+            }
+            self.running.info.device_state = badge.state();
             self.ui.trouble = badge.trouble();
         }
         let view = View {
@@ -214,12 +219,12 @@ impl Page {
     /// Turns the sensitivity of the person's device, and shows where it stands until the
     /// next key.
     fn tune(&mut self, more: bool) {
-        let Some(sensitivity) = self.running.info.sensitivity else {
+        if self.running.info.device.is_none() {
             self.ui.message = Some("nobody's device steers: no sensitivity to turn".to_owned());
             return;
-        };
-        let turned = sensitivity::stepped(sensitivity, more);
-        self.running.info.sensitivity = Some(turned);
+        }
+        let turned = sensitivity::stepped(self.running.info.sensitivity, more);
+        self.running.info.sensitivity = turned;
         self.ui.tuned = Some(turned);
         self.ask(Command::Sensitivity(turned));
     }

@@ -11,7 +11,7 @@ use crate::task::swing_up::SwingUp;
 use crate::tui::palette::Role;
 use crate::tui::pen::{Pen, columns};
 use crate::tui::scene::Scene;
-use crate::tui::text::{count, fixed, mean, signed, sparkline};
+use crate::tui::text::{count, cut, fixed, mean, signed, sparkline};
 
 /// Draws two columns of numbers into five rows.
 pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
@@ -100,6 +100,11 @@ fn learner_and_clock(pen: &mut Pen<'_>, view: &View<'_>) {
     let fields = format!("{:>4}/{}", seen.fields, view.info.field_cap);
     left(pen, 3, "fields", &fields, Role::Text);
     right(pen, 3, "learned", &count(seen.learned, 6));
+    let has_trouble = seen.lost_rows > 0 || seen.missed > 0;
+    if !has_trouble && !view.info.device_state.is_empty() && view.phase().is_steered() {
+        pen.text(0, 4, &cut(&view.info.device_state, 30), Role::Text);
+        return;
+    }
     let tick = view.info.tick_s * 1e3;
     left(pen, 4, "tick", &format!("{} ms", fixed(tick, 5, 0)), Role::Text);
     if seen.lost_rows > 0 {

@@ -4,6 +4,10 @@ use super::View;
 use crate::session::machine::{Finish, Stage};
 use crate::tui::palette::Role;
 use crate::tui::pen::{Pen, columns};
+use crate::tui::text::wrapped;
+
+/// The widest line of a box.
+const MEASURE: usize = 44;
 
 /// Draws the box that belongs to the stage, if one does.
 pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
@@ -25,6 +29,10 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
         }
         _ => return,
     };
+    let room = usize::from(pen.width().saturating_sub(8)).min(MEASURE);
+    let trouble = view.ui.trouble.as_deref().map(|words| wrapped(words, room)).unwrap_or_default();
+    let lines: Vec<&str> =
+        trouble.iter().map(String::as_str).chain(lines.iter().copied()).collect();
     let widest = lines.iter().map(|line| columns(line)).max().unwrap_or(0);
     let (width, height) =
         (widest.max(columns(title) + 2) + 4, u16::try_from(lines.len()).unwrap_or(0) + 2);
@@ -32,6 +40,7 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
     let mut page = pen.part(x, 1, width, height);
     let mut page = page.boxed(title, role);
     for (line, y) in lines.iter().zip(0..) {
-        page.text(0, y, line, Role::Text);
+        let is_trouble = usize::from(y) < trouble.len();
+        page.text(0, y, line, if is_trouble { Role::Alarm } else { Role::Text });
     }
 }

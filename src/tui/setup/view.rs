@@ -10,7 +10,7 @@ use crate::operator::Choice;
 use crate::operator::mouse::Steer;
 use crate::profile::{Experiment, WantedMode};
 use crate::session::plan::Wanted;
-use crate::tui::keys::Screen;
+use crate::tui::keys::{Hand, Screen};
 use crate::tui::palette::{Look, Role};
 use crate::tui::pen::Pen;
 use crate::tui::scene::{self, Scene};
@@ -79,7 +79,7 @@ impl View<'_> {
         self.how(pen);
         self.picture(pen, height);
         self.below(pen, height);
-        help::hints(pen, height - 1, Screen::Setup, true);
+        help::hints(pen, height - 1, Screen::Setup, Hand::Absent);
     }
 
     /// How the value of `field` is shown.
