@@ -90,8 +90,12 @@ impl Desk {
 
     fn picture(&self, width: u16, height: u16) -> String {
         let mut terminal = ratatui::Terminal::new(TestBackend::new(width, height)).unwrap();
-        let extras =
-            Extras { look: self.look, key_releases: "reported by the terminal", push: self.push };
+        let extras = Extras {
+            look: self.look,
+            key_releases: "reported by the terminal",
+            push: self.push,
+            pointer: None,
+        };
         terminal.draw(|frame| devices::draw(frame, &self.devices, &extras)).unwrap();
         terminal.backend().to_string()
     }

@@ -465,3 +465,17 @@ fn no_row_is_lost_as_fast_as_it_can() {
     assert_eq!(rows.lines().count() - 1, implied);
     assert_eq!(episodes.lines().count(), 1 + 100 + 100);
 }
+
+#[test]
+fn the_devices_have_a_screen_that_is_left_with_q() {
+    let mut terminal = Seat { answers: Answers::WithKitty, ..Seat::default() }.open("devices");
+    terminal.shows("serial ports");
+    terminal.keys("\x1b[C");
+    terminal.shows("hold a or d");
+    terminal.shows("reported by the terminal");
+    terminal.keys("\x1b[D\x1b[D");
+    terminal.shows("key releases  yes");
+    terminal.keys("q");
+    assert_eq!(terminal.code(), 0);
+    terminal.is_given_back();
+}

@@ -29,7 +29,7 @@ use crate::profile::{Document, Profile};
 use crate::signal::Seconds;
 use crate::tui::app::End;
 use crate::tui::devices::{self, Bench, Devices, Survey, Terminal, gamepads};
-use crate::tui::terminal::{Abilities, Feed, Screen, give_back, probe, speaks_unicode};
+use crate::tui::terminal::{Abilities, Feed, KeysFrom, Screen, give_back, probe, speaks_unicode};
 
 /// Where profiles are saved.
 const PROFILES: &str = "profiles";
@@ -166,7 +166,8 @@ fn on_screen(
     };
     let mut here = Here { computer: Computer::default(), heard, shutdown: Shutdown::listen() };
     keep_panics_off_the_screen();
-    let mut screen = Screen::take(feed).map_err(|error| RunError::Usage(error.to_string()))?;
+    let mut screen =
+        Screen::take(feed, KeysFrom::Input).map_err(|error| RunError::Usage(error.to_string()))?;
     let ended =
         panic::catch_unwind(AssertUnwindSafe(|| devices::show(&mut screen, &mut here, devices)));
     // A terminal that is gone lets even its farewell fail.

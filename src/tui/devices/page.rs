@@ -46,6 +46,7 @@ pub fn show(screen: &mut Screen, bench: &mut dyn Bench, mut devices: Devices) ->
             look: look(devices.profile().screen.glyphs),
             key_releases: hands.knowledge().words(),
             push: keyboard.push * hands.push(clock.now()),
+            pointer: None,
         };
         if screen.draw(|frame| draw(frame, &devices, &extras)).is_err() {
             return End::Lost;

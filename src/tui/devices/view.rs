@@ -7,7 +7,7 @@ use crate::backend::serial::ports::Port;
 use crate::host::Problem;
 use crate::operator::Device;
 use crate::operator::gamepad::learn::{Learner, Step};
-use crate::tui::keys::Screen;
+use crate::tui::keys::{Hand, Screen};
 use crate::tui::palette::{Look, Role};
 use crate::tui::pen::{Pen, columns};
 use crate::tui::setup::lines::{Light, Signs, input, note, push};
@@ -23,6 +23,8 @@ pub struct Extras<'a> {
     pub key_releases: &'a str,
     /// The keyboard's deflection, −1 to 1.
     pub push: f64,
+    /// The mouse's, while it is read.
+    pub pointer: Option<f64>,
 }
 
 /// The columns of labels and values.
@@ -60,6 +62,7 @@ impl View<'_> {
         self.tabs(pen);
         let below = self.below(width);
         let least = match self.devices.page {
+            _ if self.devices.learner.is_some() => 10,
             // The curve and its words.
             Page::Hand(Device::Gamepad) if self.devices.heard() == 0 => 4,
             Page::Hand(_) => 12,
@@ -73,7 +76,7 @@ impl View<'_> {
             self.page(&mut page);
         }
         self.bottom(pen, top, wanted, &below);
-        help::hints(pen, height - 1, Screen::Devices, true);
+        help::hints(pen, height - 1, Screen::Devices, Hand::Nobody);
     }
 
     fn head(&self, pen: &mut Pen<'_>) {
@@ -158,17 +161,16 @@ impl View<'_> {
         note(pen, 0, 1, pen.width(), &format!("{}; {rights}", pad.mapping), Role::Dim);
         note(pen, 0, 2, pen.width(), &format!("GUID {}", pad.guid), Role::Dim);
         let map = &self.devices.profile.operator.gamepad.map;
-        let mut x = 0;
+        let (mut x, mut y) = (0, 3);
         for (purpose, button) in map.buttons() {
             let name = button.map_or_else(|| "none".to_owned(), |button| button.to_string());
             let is_held = pad.buttons.get(&name) == Some(&true);
-            let y = 3;
-            if x + columns(purpose) + columns(&name) + 1 > pen.width() {
-                break;
+            let shown = if is_held { format!("[{name}]") } else { name };
+            if x + columns(purpose) + columns(&shown) + 1 > pen.width() {
+                (x, y) = (0, y + 1);
             }
             let end = pen.text(x, y, purpose, Role::Dim);
             let role = if is_held { Role::Go } else { Role::Text };
-            let shown = if is_held { format!("[{name}]") } else { name };
             x = pen.text(end + 1, y, &shown, role) + 2;
         }
         let held: Vec<&str> = pad
@@ -182,12 +184,12 @@ impl View<'_> {
             1 => "; 1 more pad waits".to_owned(),
             _ => format!("; {others} more pads wait"),
         };
-        note(pen, 0, 4, pen.width(), &format!("held {held}{more}"), Role::Text);
+        note(pen, 0, 5, pen.width(), &format!("held {held}{more}"), Role::Text);
     }
 
     /// Where the axes are, the one that steers first.
     fn axes(&self, pen: &mut Pen<'_>, pad: &Gamepad) {
-        const FIRST: u16 = 6;
+        const FIRST: u16 = 7;
         let steer = &pad.steering.axis;
         let others = pad.axes.iter().filter(|(name, _)| *name != steer);
         let all: Vec<(&String, f64)> = std::iter::once((steer, pad.steering.raw))
@@ -198,8 +200,8 @@ impl View<'_> {
         for ((name, at), y) in all.iter().take(shown).zip(FIRST..) {
             let role = if *name == steer { Role::Strong } else { Role::Text };
             pen.text(0, y, &cut(name, 13), role);
-            push(pen, (VALUE, y, 9), *at);
-            let end = pen.text(VALUE + 22, y, &signed(*at, 5, 2), role);
+            push(pen, (VALUE, y, 7), *at);
+            let end = pen.text(VALUE + 18, y, &signed(*at, 5, 2), role);
             if *name == steer {
                 pen.text(end + 1, y, "steers", Role::You);
             }
@@ -237,7 +239,7 @@ impl View<'_> {
     }
 
     fn mouse(&self, pen: &mut Pen<'_>) {
-        let left = self.curve(pen, Device::Mouse, None);
+        let left = self.curve(pen, Device::Mouse, self.extras.pointer);
         let mut pen = pen.part(0, 0, left, pen.height());
         let params = &self.devices.profile.operator.mouse;
         let word = |value: &dyn std::fmt::Debug| format!("{value:?}").to_lowercase();
