@@ -19,6 +19,7 @@ use std::process::{Command, Stdio};
 use coadapt::clock::{Clock, VirtualClock, WallClock};
 use coadapt::control::snapshot::{Command as WatcherCommand, Watcher};
 use coadapt::learner::{Learner, Model, lwpr, rfwr};
+use coadapt::operator::mouse::Pointer;
 use coadapt::operator::terminal::{self, Hands};
 use coadapt::profile::Order;
 use coadapt::profile::settings::{LearnerFile, build};
@@ -371,7 +372,8 @@ fn a_discarded_rollout_is_in_no_refit() {
         order.change(key, value);
     }
     let hands = Hands::new(&terminal::Params::default());
-    let keys = Keys { hands, clock: WallClock::start() };
+    let pointer = Pointer::default();
+    let keys = Keys { hands, pointer, clock: WallClock::start() };
     let session = Session::begin(&order, Company::Attended(keys)).unwrap();
     let folder = session.folder().to_owned();
     let watcher = session.watcher.clone();

@@ -341,6 +341,29 @@ fn paused_stopped_finished() {
 }
 
 #[test]
+fn a_gamepad_that_is_gone_and_one_that_is_relayed() {
+    let mut info = info();
+    info.device = Some(Device::Gamepad);
+    info.operator = "gamepad Xbox Wireless Controller, left_stick_x, SDL mapping".to_owned();
+    let mut snapshot = running(Phase::Main);
+    info.device_state = "relay 12 ms old, 3 lost, 0 bad".to_owned();
+    small("relayed_gamepad", &info, &snapshot, &Ui::default());
+    info.device_state = String::new();
+    let trouble =
+        "Xbox Wireless Controller is unplugged: plug it in, or press start on Gamepad F310";
+    let ui = Ui { trouble: Some(trouble.to_owned()), ..Ui::default() };
+    snapshot.human = Intent::Absent;
+    small("absent_gamepad", &info, &snapshot, &ui);
+    snapshot.stage = Stage::Paused(moment(Phase::Main));
+    both("gone_gamepad", &info, &snapshot, &ui);
+    snapshot.stage = Stage::Instruction(Moment::start_of(Phase::Main));
+    small("briefing_without_gamepad", &info, &snapshot, &ui);
+    // Nobody steers the robot's own rollouts: then it is no trouble.
+    let shown = picture(80, 24, &info, &running(Phase::Autonomous), &ui).to_string();
+    assert!(!shown.contains("unplugged"), "{shown}");
+}
+
+#[test]
 fn what_the_subject_sees() {
     let ui = Ui { subject_view: true, ..Ui::default() };
     both("subject", &info(), &running(Phase::Main), &ui);

@@ -106,7 +106,8 @@ impl Desk {
     fn picture_on(&self, width: u16, height: u16, look: Look) -> TestBackend {
         let extras = Extras {
             look,
-            key_releases: "estimated from key repeats",
+            key_releases: "estimated from key repeats inside tmux, up to 120 ms late",
+            pointer: "pointer in pixels (1600 × 960)",
             hands: self.hands,
             time_s: 0.0,
         };
@@ -438,7 +439,13 @@ fn a_long_command_is_shown_whole_in_turns() {
     let look = Look::default();
     let mut shown = String::new();
     for turn in 0..4 {
-        let extras = Extras { look, key_releases: "", hands: None, time_s: 4.0 * f64::from(turn) };
+        let extras = Extras {
+            look,
+            key_releases: "",
+            pointer: "",
+            hands: None,
+            time_s: 4.0 * f64::from(turn),
+        };
         let mut terminal = Terminal::new(TestBackend::new(80, 24)).unwrap();
         terminal.draw(|frame| setup::draw(frame, &desk.setup, &desk.shelf, &extras)).unwrap();
         shown += &terminal.backend().to_string();

@@ -138,6 +138,145 @@ fn keys_typed_while_the_terminal_is_asked_arrive() {
     terminal.is_given_back();
 }
 
+/// A live session that the mouse steers, on a terminal that answers as `answers` says.
+fn moused(answers: Answers, more: &str) -> Terminal {
+    let line = format!("{CALM} --operator mouse {more}");
+    let terminal = Seat { answers, ..Seat::default() }.open(&line);
+    terminal.shows("Enter   begin");
+    terminal.keys("\r");
+    terminal.goes();
+    terminal.shows_that("a mouse that is read", |_| terminal.wrote("\x1b[?1003h\x1b[?1006h"));
+    terminal
+}
+
+/// The pointer goes along a row, a step a hundredth of a second.
+fn sweep(terminal: &Terminal, columns: impl Iterator<Item = u16>) {
+    for column in columns {
+        terminal.keys(&format!("\x1b[<35;{column};9M"));
+        rest(0.01);
+    }
+}
+
+#[test]
+fn the_mouse_pushes_as_it_moves_and_not_when_it_rests() {
+    let mut terminal = moused(Answers::Plainly, "");
+    assert!(!terminal.wrote("\x1b[?1016h"), "nobody offered pixels");
+    terminal.shows("cells (80 × 24)");
+    sweep(&terminal, 10..60);
+    terminal.shows_that("no push", |screen| push(screen) == Some(0.0));
+    let pushed = |is: fn(f64) -> bool| terminal.pushes(FOLDER).into_iter().any(is);
+    terminal.shows_that("a push to the right", |_| pushed(|u| u > 1.0));
+    assert!(!pushed(|u| u < 0.0));
+    sweep(&terminal, (10..60).rev());
+    terminal.shows_that("a push to the left", |_| pushed(|u| u < -1.0));
+    // What leaves the window and comes back did not move.
+    terminal.keys("\x1b[O");
+    terminal.shows_that("no push", |screen| push(screen) == Some(0.0));
+    end(&terminal);
+    assert_eq!(terminal.code(), 0);
+    terminal.is_given_back();
+    let raw = terminal.column(FOLDER, "raw");
+    assert!(raw.iter().all(|raw| raw.abs() <= 1.0));
+    assert_eq!(raw.last(), Some(&0.0));
+    let session = terminal.session(FOLDER);
+    assert_eq!(session["devices"][1], "mouse, pointer in cells (80 × 24)");
+    assert!(session["key_releases"].is_null());
+}
+
+#[test]
+fn the_mouse_is_read_in_pixels_where_the_terminal_offers_them() {
+    let mut terminal = moused(Answers::WithPixels, "");
+    terminal.shows_that("pixels", |_| terminal.wrote("\x1b[?1016h"));
+    terminal.shows_that("no pointer", |_| terminal.wrote("\x1b]22;none"));
+    sweep(&terminal, 400..440);
+    // A cell is 0.14 at least.
+    let is_fine = |raw: f64| raw > 0.0 && raw < 0.1;
+    terminal
+        .shows_that("a small push", |_| terminal.column(FOLDER, "raw").into_iter().any(is_fine));
+    terminal.resize(100, 30);
+    terminal.shows("pixels (1000 × 600)");
+    end(&terminal);
+    assert_eq!(terminal.code(), 0);
+    terminal.is_given_back();
+    let devices = &terminal.session(FOLDER)["devices"];
+    assert_eq!(devices[1], "mouse, pointer in pixels (800 × 480)");
+    assert_eq!(devices[2], "mouse, pointer in pixels (1000 × 600)");
+}
+
+#[test]
+fn the_pointers_place_draws_the_plant_where_the_profile_says_so() {
+    let more = "--set operator.mouse.steer=position --set operator.mouse.hide_pointer=false";
+    let mut terminal = moused(Answers::Plainly, more);
+    assert!(!terminal.wrote("\x1b]22;none"));
+    terminal.keys("\x1b[<35;80;9M");
+    let pushed = || terminal.pushes(FOLDER).into_iter().any(|u| u > 5.0);
+    terminal.shows_that("a push to the right", |_| pushed());
+    end(&terminal);
+    assert_eq!(terminal.code(), 0);
+    terminal.is_given_back();
+    assert!(terminal.column(FOLDER, "raw").contains(&1.0));
+}
+
+#[test]
+fn the_mouse_is_given_back_on_every_way_out() {
+    for (signal, code) in [("TERM", 143), ("HUP", 129), ("INT", 130)] {
+        let mut terminal = moused(Answers::WithPixels, "");
+        terminal.signal(signal);
+        assert_eq!(terminal.code(), code, "SIG{signal}");
+        terminal.is_given_back();
+    }
+    let mut terminal = moused(Answers::WithPixels, "");
+    terminal.keys("\x03");
+    assert_eq!(terminal.code(), 130);
+    terminal.is_given_back();
+}
+
+#[test]
+fn a_flood_of_movements_drowns_no_key() {
+    let mut terminal = moused(Answers::WithPixels, "");
+    let flood: String = (0..10_000).map(|k| format!("\x1b[<35;{};9M", 1 + k % 800)).collect();
+    terminal.keys(&flood);
+    terminal.keys("p");
+    terminal.shows("progress hidden");
+    end(&terminal);
+    assert_eq!(terminal.code(), 0);
+    terminal.is_given_back();
+}
+
+#[test]
+fn the_mouse_is_tried_before_a_session_and_only_then_read() {
+    let mut terminal = Seat { answers: Answers::WithPixels, ..Seat::default() }.open("");
+    terminal.shows("Enter begin");
+    // From the profile to the operator, the second after the keyboard.
+    terminal.keys(&"\t".repeat(8));
+    terminal.keys("\x1b[C\x1b[C");
+    terminal.shows("the pointer's velocity is the force");
+    assert!(!terminal.wrote("\x1b[?1003h"));
+    terminal.keys("t");
+    terminal.shows("move the mouse; pointer in pixels (800 × 480)");
+    terminal.keys("\x1b[<35;1;1M\x1b[<35;800;1M");
+    terminal.keys("\x1b");
+    terminal.shows_that("a mouse that is left alone", |_| terminal.wrote("\x1b[?1003l"));
+    terminal.keys("q");
+    assert_eq!(terminal.code(), 0);
+    terminal.is_given_back();
+}
+
+#[test]
+fn within_tmux_the_keyboard_says_what_it_costs() {
+    let variables = vec![("TMUX", "/tmp/tmux-0/default,1,0"), ("TERM", "tmux-256color")];
+    let mut terminal = Seat { variables, columns: 120, rows: 40, ..Seat::default() }.open(CALM);
+    terminal.shows("Enter   begin");
+    terminal.keys("\r");
+    terminal.goes();
+    terminal.shows("inside tmux, up to 120 ms late");
+    end(&terminal);
+    assert_eq!(terminal.code(), 0);
+    let session = terminal.session(FOLDER);
+    assert_eq!(session["key_releases"], "estimated from key repeats");
+    assert_eq!(session["devices"][1], "keyboard, releases estimated from key repeats inside tmux");
+}
+
 /// The number beside the bar `you`, N.
 fn push(screen: &str) -> Option<f64> {
     let row = screen.lines().find(|line| line.starts_with(" you") && line.contains(" N "))?;

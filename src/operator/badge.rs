@@ -43,6 +43,13 @@ impl Badge {
         self.signs().words.clone()
     }
 
+    /// Both: which device it is, and how it does at the moment.
+    #[must_use]
+    pub fn words_now(&self) -> String {
+        let Signs { words, state, .. } = &*self.signs();
+        if state.is_empty() { words.clone() } else { format!("{words}, {state}") }
+    }
+
     /// How the device does at the moment; mostly empty.
     #[must_use]
     pub fn state(&self) -> String {

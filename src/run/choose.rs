@@ -12,6 +12,7 @@ use crate::operator::gamepad::events::Events;
 use crate::operator::gamepad::hub::Hub;
 use crate::operator::gamepad::link::Link;
 use crate::operator::gamepad::{self, Gamepad, Source};
+use crate::operator::mouse::Mouse;
 use crate::operator::script::{Recorded, Script};
 use crate::operator::simulated::{self, Kind, Skill};
 use crate::operator::terminal::Keyboard;
@@ -152,9 +153,14 @@ pub(super) fn steer(
             let device = Device { badge: gamepad.badge(), hands: None };
             Hand { operator: Box::new(gamepad), device: Some(device) }
         }
-        Choice::Mouse => return Err(RunError::Usage(String::new())),
+        Choice::Mouse => {
+            let Keys { pointer, clock, .. } = attended(company, "mouse")?;
+            let mouse = Mouse::new(pointer.clone(), *clock, &params.mouse, limit, tick);
+            let device = Device { badge: mouse.badge(), hands: None };
+            Hand { operator: Box::new(mouse), device: Some(device) }
+        }
         Choice::Keyboard => {
-            let Keys { hands, clock } = attended(company, "keyboard")?;
+            let Keys { hands, clock, .. } = attended(company, "keyboard")?;
             let keyboard = Keyboard::new(hands.clone(), *clock, &params.keyboard, limit, tick);
             let device = Device { badge: keyboard.badge(), hands: Some(hands.clone()) };
             Hand { operator: Box::new(keyboard), device: Some(device) }

@@ -15,8 +15,9 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::cli;
 use crate::clock::WallClock;
+use crate::operator::mouse::Pointer;
 use crate::operator::terminal::{self, Hands};
-use crate::operator::{Choice, Via};
+use crate::operator::{Choice, Device, Via};
 use crate::profile::{self, Document, Order, ProfileError};
 use crate::record::{self, folder};
 use crate::session::Phase;
@@ -29,7 +30,7 @@ use crate::tui::live::Info;
 use crate::tui::results;
 use crate::tui::scene::{self, Scene};
 use crate::tui::setup::Shelf;
-use crate::tui::terminal::{Feed, KeysFrom, Screen, give_back, is_taken};
+use crate::tui::terminal::{Feed, KeysFrom, Mouse, Screen, give_back, inside, is_taken};
 
 /// The folder of local profiles.
 const PROFILES: &str = "profiles";
@@ -40,7 +41,7 @@ pub(super) static LAST_WORDS: Mutex<Option<String>> = Mutex::new(None);
 /// Opens the set-up screen, or the session that the command line asks for.
 pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
     let clock = WallClock::start();
-    let feed = Feed::new(Hands::new(&terminal::Params::default()), clock);
+    let feed = Feed::new(hands(), clock);
     let mut stage =
         Stage { feed: feed.clone(), shutdown: Shutdown::listen(), running: None, last: None };
     let keys = keys_of(run);
@@ -143,14 +144,14 @@ struct Stage {
 
 impl Stage {
     fn start(&mut self, order: &Order) -> Result<Running, RunError> {
-        let hands = Hands::new(&terminal::Params::default());
-        let session = Session::begin(order, self.company(&hands))?;
-        self.raise_curtain(session, hands, order.clone())
+        let keys = self.keys();
+        let session = Session::begin(order, Company::Attended(keys.clone()))?;
+        self.raise_curtain(session, keys, order.clone())
     }
 
     fn take_up(&mut self, folder: &Path) -> Result<Running, RunError> {
-        let hands = Hands::new(&terminal::Params::default());
-        let session = Session::resume(folder, self.company(&hands))?;
+        let keys = self.keys();
+        let session = Session::resume(folder, Company::Attended(keys.clone()))?;
         let sidecar = session.sidecar();
         let order = Order {
             subject: sidecar.subject.clone(),
@@ -158,27 +159,29 @@ impl Stage {
             logs: folder.ancestors().nth(2).map_or_else(|| "logs".into(), Path::to_owned),
             ..Order::default()
         };
-        self.raise_curtain(session, hands, order)
+        self.raise_curtain(session, keys, order)
     }
 
-    fn company(&self, hands: &Hands) -> Company {
-        Company::Attended(Keys { hands: hands.clone(), clock: self.feed.clock })
+    /// Keys and a pointer for a new session.
+    fn keys(&self) -> Keys {
+        Keys { hands: hands(), pointer: Pointer::default(), clock: self.feed.clock }
     }
 
     fn raise_curtain(
         &mut self,
         session: Session,
-        hands: Hands,
+        keys: Keys,
         order: Order,
     ) -> Result<Running, RunError> {
         // Only now is it known whose keyboard it is, for a resumed session as for a new one.
-        hands.set_timing(&session.profile().operator.keyboard);
-        self.feed.replace(hands);
+        keys.hands.set_timing(&session.profile().operator.keyboard);
+        self.feed.replace(keys.hands, keys.pointer);
         let running = Running {
             info: info(&session),
             watcher: session.watcher.clone(),
             frames: session.frames.clone(),
             badge: session.device.as_ref().map(|device| device.badge.clone()),
+            mouse: mouse(&session),
             screen: session.profile().screen.clone(),
             // The next session has a number and chance of its own.
             order: Order { trial: None, seed: None, ..order },
@@ -259,12 +262,31 @@ impl Conductor for Stage {
     }
 }
 
+/// Hands that touch no key.
+fn hands() -> Hands {
+    Hands::new(&terminal::Params::default()).inside(inside())
+}
+
+/// How the mouse is to be read over the live screen: only by a session that it steers.
+fn mouse(session: &Session) -> Mouse {
+    match device(session) {
+        Some(Device::Mouse) if session.profile().operator.mouse.hide_pointer => Mouse::Hidden,
+        Some(Device::Mouse) => Mouse::Read,
+        _ => Mouse::Unread,
+    }
+}
+
+/// The device that the person has a hand on.
+fn device(session: &Session) -> Option<Device> {
+    session.sidecar().operator.parse::<Choice>().ok().and_then(|choice| choice.device())
+}
+
 /// The facts of a session for the live screen.
 fn info(session: &Session) -> Info {
     let (profile, sidecar) = (session.profile(), session.sidecar());
     let task = profile.experiment.task(profile.tick());
     let plan = Plan::new(&profile.session, profile.tick(), sidecar.seed, true);
-    let device = sidecar.operator.parse().ok().and_then(|choice: Choice| choice.device());
+    let device = device(session);
     let texts = &profile.session.instructions;
     let main = match sidecar.mode {
         Mode::Simultaneous => &texts.simultaneous,

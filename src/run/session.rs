@@ -16,6 +16,7 @@ use crate::control::scribe::{Device, Origin, Scribe, standing_of};
 use crate::control::snapshot::{Watcher, channel};
 use crate::control::witness::Standing;
 use crate::learner::Model;
+use crate::operator::mouse::Pointer;
 use crate::operator::terminal::Hands;
 use crate::operator::{self, Choice};
 use crate::profile::{Document, Order, Profile};
@@ -30,13 +31,15 @@ use crate::study::evaluate::simulated_backend;
 /// The largest number that a person may give a trial.
 const MOST_TRIALS: u32 = 999_999;
 
-/// The keyboard as a session needs it: what the terminal's reader feeds, and the clock that
-/// both go by.
+/// Keyboard and mouse as a session needs them: what the terminal's reader feeds, and the clock
+/// that both go by.
 #[derive(Clone, Debug)]
 pub struct Keys {
     /// The steering keys.
     pub hands: Hands,
-    /// The time of key events and ticks.
+    /// The mouse's pointer.
+    pub pointer: Pointer,
+    /// The time of events and ticks.
     pub clock: WallClock,
 }
 

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use ratatui::crossterm::event::Event;
 
-use super::terminal::{Heard, Screen};
+use super::terminal::{Heard, Mouse, Screen};
 use super::{live, results, setup};
 use crate::control::snapshot::Watcher;
 use crate::operator::Badge;
@@ -27,6 +27,8 @@ pub struct Running {
     pub frames: Arc<AtomicU64>,
     /// What the person's device says of itself, where there is one.
     pub badge: Option<Badge>,
+    /// How the mouse is to be read.
+    pub mouse: Mouse,
     /// What the profile says about the screen.
     pub screen: profile::Screen,
     /// What the set-up shows after it: the same choices, the next trial.
@@ -109,6 +111,7 @@ pub fn run(
         Start::Live(running) => Next::Live(running),
     };
     loop {
+        screen.keep_mouse(Mouse::Unread);
         next = match next {
             Next::Setup(order) => setup_page::show(screen, conductor, *order)?,
             Next::Live(running) => live_page::show(screen, conductor, *running)?,

@@ -39,10 +39,18 @@ fn instruction(pen: &mut Pen<'_>, view: &View<'_>, moment: Moment) {
         pen.text(left, y, &line, Role::Text);
         y += 1;
     }
-    if moment.phase.is_steered() && !view.info.operator.is_empty() {
-        pen.text(left, y + 1, &view.info.operator, Role::Dim);
+    y += 1;
+    if moment.phase.is_steered() {
+        for line in wrapped(&view.info.operator, usize::from(width)) {
+            pen.text(left, y, &line, Role::Dim);
+            y += 1;
+        }
     }
-    button(pen, y + 3, "Enter   begin");
+    for line in view.trouble_words(usize::from(width)) {
+        pen.text(left, y, &line, Role::Alarm);
+        y += 1;
+    }
+    button(pen, y + 1, "Enter   begin");
 }
 
 fn rest(pen: &mut Pen<'_>, view: &View<'_>, next: Moment, ticks_left: u32) {

@@ -228,6 +228,12 @@ impl View<'_> {
         format!("{doing}{at}")
     }
 
+    /// What is wrong with the person's device, in lines of at most `width`.
+    pub(super) fn trouble_words(&self, width: usize) -> Vec<String> {
+        let trouble = self.ui.trouble.as_deref().filter(|_| self.phase().is_steered());
+        trouble.map(|words| super::text::wrapped(words, width)).unwrap_or_default()
+    }
+
     /// Writes the message, if there is one, into row `y`, or does `otherwise`.
     pub(super) fn message_or(
         &self,
@@ -236,9 +242,10 @@ impl View<'_> {
         otherwise: impl FnOnce(&mut Pen<'_>),
     ) {
         let room = usize::from(pen.width().saturating_sub(2));
-        // A box says what is wrong already, and its keys are wanted.
-        let has_box = matches!(self.panel.stage, Stage::Paused(_));
-        let trouble = self.ui.trouble.as_ref().filter(|_| !has_box);
+        // A page or a box says what is wrong already, and its keys are wanted.
+        let has_box = matches!(self.panel.stage, Stage::Paused(_) | Stage::Instruction(_));
+        let is_due = self.phase().is_steered() && !has_box;
+        let trouble = self.ui.trouble.as_ref().filter(|_| is_due);
         match (self.ui.message.as_ref().or(trouble), self.ui.tuned) {
             (Some(message), _) => {
                 pen.text(1, y, &super::text::cut(message, room), Role::Alarm);

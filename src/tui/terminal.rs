@@ -2,18 +2,20 @@
 
 mod abilities;
 mod answers;
+mod capture;
+mod feed;
 mod probe;
 
 use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use ratatui::Frame;
 use ratatui::backend::CrosstermBackend;
 use ratatui::crossterm::event::{
-    self, DisableFocusChange, EnableFocusChange, Event, KeyEventKind, KeyboardEnhancementFlags,
+    self, DisableFocusChange, EnableFocusChange, Event, KeyboardEnhancementFlags,
     PopKeyboardEnhancementFlags, PushKeyboardEnhancementFlags,
 };
 use ratatui::crossterm::terminal::{
@@ -23,13 +25,13 @@ use ratatui::crossterm::terminal::{
 use ratatui::crossterm::{cursor, execute, queue};
 
 pub use abilities::Abilities;
-pub use probe::probe;
+pub use capture::Mouse;
+pub use feed::Feed;
+pub use probe::{inside, probe};
 
 use probe::Tty;
 
 use super::palette::{Glyphs, Look, Palette};
-use crate::clock::{Clock, WallClock};
-use crate::operator::terminal::Hands;
 use crate::profile;
 
 /// Whether the terminal is ours, so that it is given back exactly once.
@@ -76,50 +78,6 @@ pub enum Heard {
     Nothing,
     /// The terminal is gone.
     Lost,
-}
-
-/// The steering keys that the reader feeds; a session puts its own in place.
-#[derive(Clone, Debug)]
-pub struct Feed {
-    hands: Arc<Mutex<Hands>>,
-    /// The time of key events and ticks.
-    pub clock: WallClock,
-}
-
-impl Feed {
-    /// A feed for `hands`.
-    #[must_use]
-    pub fn new(hands: Hands, clock: WallClock) -> Self {
-        Self { hands: Arc::new(Mutex::new(hands)), clock }
-    }
-
-    /// From now on feeds `hands`, which know of releases what the ones before knew.
-    pub fn replace(&self, hands: Hands) {
-        let mut slot = self.hands.lock().unwrap_or_else(PoisonError::into_inner);
-        hands.set_releases_known(REPORTS_RELEASES.load(Ordering::Relaxed));
-        *slot = hands;
-    }
-
-    /// The hands that are fed now.
-    #[must_use]
-    pub fn hands(&self) -> Hands {
-        self.hands.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
-    fn take(&self, event: &Event) {
-        match event {
-            Event::Key(key) => {
-                let hands = self.hands();
-                if key.kind == KeyEventKind::Release {
-                    REPORTS_RELEASES.store(true, Ordering::Relaxed);
-                    hands.set_releases_known(true);
-                }
-                hands.feed(key, self.clock.now());
-            }
-            Event::FocusLost => self.hands().release_all(),
-            _ => {}
-        }
-    }
 }
 
 /// The terminal while it is ours.
@@ -198,7 +156,13 @@ impl Screen {
         }
     }
 
-    /// The feed of steering keys.
+    /// Reads the mouse from now on, or no longer. It is read once the terminal has said
+    /// whether in pixels or in cells, so this is to be asked for again with every picture.
+    pub fn keep_mouse(&mut self, wanted: Mouse) {
+        capture::keep(self.terminal.backend_mut(), wanted, &self.feed);
+    }
+
+    /// The feed of steering keys and the pointer.
     #[must_use]
     pub const fn feed(&self) -> &Feed {
         &self.feed
@@ -219,6 +183,7 @@ pub fn give_back() {
         return;
     }
     let mut out = io::stdout();
+    capture::give_back(&mut out);
     if REPORTS_RELEASES.load(Ordering::SeqCst) {
         let _ = execute!(out, PopKeyboardEnhancementFlags);
     }
@@ -242,6 +207,10 @@ pub fn is_taken() -> bool {
 fn read(sender: &SyncSender<Heard>, feed: &Feed, stop: &AtomicBool) {
     let pass = |event: Event| {
         feed.take(&event);
+        // A mouse moves more often than anyone looks, and only hands care.
+        if matches!(event, Event::Mouse(_)) {
+            return;
+        }
         // A full queue means that nobody looks; hands were fed all the same.
         let _ = sender.try_send(Heard::Event(event));
     };

@@ -244,6 +244,15 @@ impl Terminal {
         assert!(last("\x1b[?1004l") > last("\x1b[?1004h"), "focus is still reported");
         assert!(last("\x1b[?2026l") > last("\x1b[?2026h"), "an update is still open");
         assert!(last("\x1b[?1049h").is_some(), "it was never taken");
+        for (on, off) in [
+            ("\x1b[?1003h", "\x1b[?1003l"),
+            ("\x1b[?1006h", "\x1b[?1006l"),
+            ("\x1b[?1016h", "\x1b[?1016l"),
+            ("\x1b[>3p", "\x1b[>1p"),
+            ("\x1b]22;none\x1b\\", "\x1b]22;\x1b\\"),
+        ] {
+            assert!(last(on).is_none() || last(off) > last(on), "{on:?} is not undone");
+        }
     }
 
     /// The colours that the program asked for.
@@ -289,13 +298,18 @@ impl Terminal {
 
     /// The person's pushes, row by row, from `steps.csv`, whose rows are whole.
     pub fn pushes(&self, folder: &str) -> Vec<f64> {
+        self.column(folder, "u_human")
+    }
+
+    /// A column of `steps.csv`, without empty cells.
+    pub fn column(&self, folder: &str, name: &str) -> Vec<f64> {
         let text = fs::read_to_string(self.at(folder).join("steps.csv")).unwrap_or_default();
         let whole = &text[..text.rfind('\n').map_or(0, |end| end + 1)];
         let mut rows = whole.lines().map(|row| row.split(',').collect::<Vec<_>>());
         let Some(header) = rows.next() else { return Vec::new() };
-        let human = header.iter().position(|name| *name == "u_human").unwrap();
+        let column = header.iter().position(|known| *known == name).unwrap();
         rows.inspect(|row| assert_eq!(row.len(), header.len(), "{row:?}"))
-            .filter_map(|row| row[human].parse().ok())
+            .filter_map(|row| row[column].parse().ok())
             .collect()
     }
 }

@@ -124,9 +124,8 @@ impl Page {
         }
         if let Some(badge) = &self.running.badge {
             // A pad that is gone has no words: then the operator's own stay.
-            let words = badge.words();
-            if !words.is_empty() {
-                self.running.info.operator = words;
+            if !badge.words().is_empty() {
+                self.running.info.operator = badge.words_now();
             }
             self.running.info.device_state = badge.state();
             self.ui.trouble = badge.trouble();
@@ -138,6 +137,7 @@ impl Page {
             history: &self.history,
             ui: &self.ui,
         };
+        screen.keep_mouse(self.running.mouse);
         if screen.draw(|frame| live::draw(frame, &view)).is_err() {
             self.leave(End::Lost);
         }

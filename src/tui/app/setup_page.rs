@@ -7,13 +7,14 @@ use ratatui::crossterm::event::Event;
 
 use super::{Conductor, End, Next, Running, hear};
 use crate::clock::Clock;
+use crate::operator::Choice;
 use crate::profile::Order;
 use crate::tui::help;
 use crate::tui::keys::Screen as Keys;
 use crate::tui::palette::Look;
 use crate::tui::pen::Pen;
 use crate::tui::setup::{self, Extras, Reaction, Setup, Shelf};
-use crate::tui::terminal::{Screen, look};
+use crate::tui::terminal::{Mouse, Screen, look};
 
 /// Where profiles are saved.
 const PROFILES: &str = "profiles";
@@ -34,11 +35,12 @@ pub(super) fn show(
     let mut page = Page { setup, shelf, help_open: false };
     loop {
         let look = look(page.setup.profile().screen.glyphs);
-        let hands = screen.feed().hands();
+        let hands = Trial::of(&page.setup, screen);
         let extras = Extras {
             look,
-            key_releases: hands.knowledge().words(),
-            hands: page.setup.is_trying_hands().then(|| hands.push(clock.now())),
+            key_releases: &hands.key_releases,
+            pointer: &hands.pointer,
+            hands: hands.push,
             time_s: clock.now().0,
         };
         let drawn = screen.draw(|frame| {
@@ -58,6 +60,38 @@ pub(super) fn show(
             }
             Ok(None) => {}
             Err(end) => return Ok(Next::End(end)),
+        }
+    }
+}
+
+/// The hands, and what they push while they are tried.
+struct Trial {
+    key_releases: String,
+    pointer: String,
+    push: Option<f64>,
+}
+
+impl Trial {
+    /// The device under the hands is the one that is chosen; the mouse is read while it is
+    /// tried.
+    fn of(setup: &Setup, screen: &mut Screen) -> Self {
+        let is_mouse = setup.operator() == Choice::Mouse;
+        let is_tried = setup.is_trying_hands();
+        screen.keep_mouse(if is_mouse && is_tried { Mouse::Read } else { Mouse::Unread });
+        let (hands, pointer) = (screen.feed().hands(), screen.feed().pointer());
+        let now = screen.feed().clock.now();
+        let push = || {
+            if is_mouse {
+                setup.profile().operator.mouse.deflection(&pointer, now)
+            } else {
+                hands.push(now)
+            }
+        };
+        let (known, late) = hands.release_words();
+        Self {
+            key_releases: if late.is_empty() { known } else { format!("{known}, {late}") },
+            pointer: pointer.grid().map_or(String::new(), |grid| grid.to_string()),
+            push: is_tried.then(push),
         }
     }
 }

@@ -4,7 +4,6 @@ use super::View;
 use crate::session::machine::{Finish, Stage};
 use crate::tui::palette::Role;
 use crate::tui::pen::{Pen, columns};
-use crate::tui::text::wrapped;
 
 /// The widest line of a box.
 const MEASURE: usize = 44;
@@ -30,7 +29,7 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
         _ => return,
     };
     let room = usize::from(pen.width().saturating_sub(8)).min(MEASURE);
-    let trouble = view.ui.trouble.as_deref().map(|words| wrapped(words, room)).unwrap_or_default();
+    let trouble = view.trouble_words(room);
     let lines: Vec<&str> =
         trouble.iter().map(String::as_str).chain(lines.iter().copied()).collect();
     let widest = lines.iter().map(|line| columns(line)).max().unwrap_or(0);

@@ -137,7 +137,8 @@ impl Drafts {
 
 impl Setup {
     /// Who steers; the keyboard while the words choose nobody.
-    pub(super) fn operator(&self) -> Choice {
+    #[must_use]
+    pub fn operator(&self) -> Choice {
         match self.order.operator.strip_prefix("script:") {
             Some(file) => Choice::Script(PathBuf::from(file)),
             None => self.order.operator.parse().unwrap_or_default(),

@@ -25,6 +25,8 @@ pub struct Extras<'a> {
     pub look: Look,
     /// How key releases are known, such as `reported by the terminal`.
     pub key_releases: &'a str,
+    /// How finely the pointer is known, in words; empty before it is read.
+    pub pointer: &'a str,
     /// The push of the hands, −1 to 1, while they are tried.
     pub hands: Option<f64>,
     /// The time of the moving picture, s.
@@ -450,7 +452,11 @@ impl View<'_> {
         pen.text(59, y, "right", Role::Dim);
         let percent = format!("{} %", signed(now * 100.0, 4, 0));
         pen.text(66, y, &percent, Role::You);
-        let about = format!("hold the arrows; releases {}   Esc ends", self.extras.key_releases);
+        let about = match (self.setup.operator(), self.extras.pointer) {
+            (Choice::Mouse, "") => "move the mouse   Esc ends".to_owned(),
+            (Choice::Mouse, pointer) => format!("move the mouse; {pointer}   Esc ends"),
+            _ => format!("hold the arrows; releases {}   Esc ends", self.extras.key_releases),
+        };
         note(pen, LABEL, y + 1, pen.width() - 1, &about, Role::Dim);
     }
 

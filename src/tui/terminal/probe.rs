@@ -79,6 +79,12 @@ pub(super) fn ask(
     Ok(abilities)
 }
 
+/// The program between the person's terminal and this one, by the environment.
+#[must_use]
+pub fn inside() -> Option<&'static str> {
+    of_system().inside()
+}
+
 /// What is known without asking.
 fn of_system() -> Abilities {
     let get = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
@@ -94,6 +100,11 @@ fn of_system() -> Abilities {
 fn cell(columns: u16, rows: u16, width: u16, height: u16) -> Option<(u16, u16)> {
     let size = (width.checked_div(columns)?, height.checked_div(rows)?);
     (size.0 > 0 && size.1 > 0).then_some(size)
+}
+
+/// A cell's size as the system knows it now, pixels.
+pub(super) fn cell_px() -> Option<(u16, u16)> {
+    window_size().ok().and_then(|size| cell(size.columns, size.rows, size.width, size.height))
 }
 
 /// Apple's Terminal and the console of older Linux print a `p` when asked for a mode.
