@@ -23,6 +23,7 @@ const BOTH: Rights = Rights { read: true, write: true };
 struct Desk {
     devices: Devices,
     push: f64,
+    pointer: Option<(String, f64)>,
     look: Look,
 }
 
@@ -35,7 +36,7 @@ impl Desk {
         let profile = document.read().unwrap();
         let document = Document::find("balance", profiles).unwrap();
         let devices = Devices::new(document, profile, profiles.to_owned());
-        Self { devices, push: 0.0, look: Look::default() }
+        Self { devices, push: 0.0, pointer: None, look: Look::default() }
     }
 
     /// Nothing can be saved here.
@@ -92,9 +93,9 @@ impl Desk {
         let mut terminal = ratatui::Terminal::new(TestBackend::new(width, height)).unwrap();
         let extras = Extras {
             look: self.look,
-            key_releases: "reported by the terminal",
+            key_releases: "estimated from key repeats inside tmux, up to 120 ms late",
             push: self.push,
-            pointer: None,
+            pointer: self.pointer.clone(),
         };
         terminal.draw(|frame| devices::draw(frame, &self.devices, &extras)).unwrap();
         terminal.backend().to_string()
@@ -229,7 +230,9 @@ fn the_keyboard_the_mouse_the_ports_and_the_terminal_have_pages() {
     desk.page(1);
     pictures!("devices_keyboard", desk);
     desk.page(1);
-    desk.shows("velocity, horizontal");
+    desk.shows("not read yet");
+    desk.pointer = Some(("pointer in pixels (720 × 432)".to_owned(), 0.8));
+    insta::assert_snapshot!("devices_mouse_80x24", desk.picture(80, 24));
     desk.devices.take(with_ports());
     desk.page(1);
     pictures!("devices_serial", desk);

@@ -224,9 +224,7 @@ fn rights(host: &Host, login: &Login, ports: &[Port]) -> Vec<Problem> {
     let shut = ports.iter().filter(|port| !port.rights.are_enough());
     let mut groups: Vec<(String, Vec<&str>)> = Vec::new();
     for port in shut {
-        // A port of the superuser's own group is given to no group at all.
-        let group = port.group.clone().filter(|group| group != "root");
-        let group = group.unwrap_or_else(|| "dialout".to_owned());
+        let group = port.group.clone().unwrap_or_else(|| "dialout".to_owned());
         match groups.iter_mut().find(|(known, _)| *known == group) {
             Some((_, paths)) => paths.push(&port.path),
             None => groups.push((group, vec![&port.path])),
@@ -240,6 +238,14 @@ fn rights(host: &Host, login: &Login, ports: &[Port]) -> Vec<Problem> {
                     "{user} is in group {group}, but not in this login, which cannot use {paths}"
                 ),
                 format!("newgrp {group}    # for this shell; or log out and in again"),
+            ),
+            // Of the superuser's own group nobody is made a member.
+            _ if group == "root" => problem(
+                format!("{paths}: no group of people may use it, as udev would set up"),
+                format!(
+                    "sudo chmod a+rw {}    # until it is plugged in again",
+                    paths.replace(", ", " ")
+                ),
             ),
             Membership::Member => problem(
                 format!("{paths}: group {group} may not read and write"),

@@ -4,12 +4,13 @@ use std::time::Duration;
 
 use ratatui::crossterm::event::Event as Heard;
 
-use super::{Devices, Extras, Reaction, Survey, draw};
+use super::{Devices, Extras, Page, Reaction, Survey, draw};
 use crate::clock::Clock;
+use crate::operator::Device;
 use crate::operator::gamepad::Event;
 use crate::signal::Seconds;
 use crate::tui::app::End;
-use crate::tui::terminal::{self, Screen, look};
+use crate::tui::terminal::{self, Mouse, Screen, look};
 
 /// The pace of the picture.
 const FRAME: Duration = Duration::from_millis(33);
@@ -40,13 +41,20 @@ pub fn show(screen: &mut Screen, bench: &mut dyn Bench, mut devices: Devices) ->
             devices.take(bench.survey(devices.heard()));
             due = clock.now() + SURVEY;
         }
-        let hands = screen.feed().hands();
-        let keyboard = &devices.profile().operator.keyboard;
+        let is_mouse = devices.page() == Page::Hand(Device::Mouse);
+        // Elsewhere the mouse selects text, such as the lines that mend something.
+        screen.keep_mouse(if is_mouse { Mouse::Read } else { Mouse::Unread });
+        let (hands, pointer) = (screen.feed().hands(), screen.feed().pointer());
+        let (operator, now) = (&devices.profile().operator, clock.now());
+        let (releases, late) = hands.release_words();
         let extras = Extras {
             look: look(devices.profile().screen.glyphs),
-            key_releases: hands.knowledge().words(),
-            push: keyboard.push * hands.push(clock.now()),
-            pointer: None,
+            key_releases: &if late.is_empty() { releases } else { format!("{releases}, {late}") },
+            push: operator.keyboard.push * hands.push(now),
+            pointer: pointer
+                .grid()
+                .filter(|_| is_mouse)
+                .map(|grid| (grid.to_string(), operator.mouse.deflection(&pointer, now))),
         };
         if screen.draw(|frame| draw(frame, &devices, &extras)).is_err() {
             return End::Lost;

@@ -157,7 +157,9 @@ impl Terminal {
                 "kitty coadapt    # or another terminal that answers",
             );
         }
-        if self.asked && !abilities.key_releases {
+        // The console's lacks were told in one.
+        let is_asked = self.asked && abilities.term.as_deref() != Some("linux");
+        if is_asked && !abilities.key_releases {
             match abilities.inside() {
                 Some(inside) => add(
                     &format!(
@@ -172,7 +174,7 @@ impl Terminal {
                 ),
             }
         }
-        if self.asked && !abilities.has_pixels() && abilities.inside().is_none() {
+        if is_asked && !abilities.has_pixels() && abilities.inside().is_none() {
             add(
                 "the mouse is read in cells, not in pixels: its steps are coarse",
                 "kitty coadapt    # or foot, Ghostty, WezTerm",
@@ -216,7 +218,11 @@ mod tests {
         assert!(with(|t| t.abilities.mouse_pixels = false).what.contains("in cells"));
         assert!(with(|t| t.abilities.size = Some((79, 30))).what.contains("79×30"));
         assert_eq!(with(|t| t.utf8 = false).mend, "export LC_ALL=C.UTF-8");
-        assert!(with(|t| t.abilities.term = Some("linux".to_owned())).what.contains("console"));
+        let console = with(|t| {
+            t.abilities.term = Some("linux".to_owned());
+            t.abilities.key_releases = false;
+        });
+        assert!(console.what.contains("console"));
         let tmux = with(|t| {
             t.abilities.tmux = true;
             t.abilities.key_releases = false;

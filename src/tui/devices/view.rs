@@ -15,7 +15,7 @@ use crate::tui::text::{cut, signed, wrapped};
 use crate::tui::{help, small};
 
 /// What the screen shows beside its own state.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Extras<'a> {
     /// How things look on this terminal.
     pub look: Look,
@@ -23,8 +23,9 @@ pub struct Extras<'a> {
     pub key_releases: &'a str,
     /// The keyboard's deflection, −1 to 1.
     pub push: f64,
-    /// The mouse's, while it is read.
-    pub pointer: Option<f64>,
+    /// How the pointer is known, such as `pointer in cells (80 × 24)`, and the mouse's
+    /// deflection, while it is read.
+    pub pointer: Option<(String, f64)>,
 }
 
 /// The columns of labels and values.
@@ -217,10 +218,12 @@ impl View<'_> {
         let mut pen = pen.part(0, 0, left, pen.height());
         pen.text(0, 0, "keyboard", Role::Strong);
         let releases = format!("key releases {}", self.extras.key_releases);
-        note(&mut pen, 0, 1, left, &releases, Role::Dim);
-        note(&mut pen, 0, 2, left, "hold a or d (h or l) to try it", Role::Dim);
-        push(&mut pen, (0, 4, 15), self.extras.push);
-        pen.text(34, 4, &signed(self.extras.push, 5, 2), Role::You);
+        for (line, y) in wrapped(&releases, usize::from(left)).iter().zip(1..3) {
+            pen.text(0, y, line, Role::Dim);
+        }
+        pen.text(0, 3, "hold a or d (h or l) to try it", Role::Dim);
+        push(&mut pen, (0, 5, 15), self.extras.push);
+        pen.text(34, 5, &signed(self.extras.push, 5, 2), Role::You);
         let params = &self.devices.profile.operator.keyboard;
         let repeat = match params.repeat_hold_s {
             Some(hold_s) => format!("{hold_s} s"),
@@ -228,7 +231,7 @@ impl View<'_> {
         };
         rows(
             &mut pen,
-            6,
+            7,
             &[
                 ("push", format!("{} of the limit", params.push)),
                 ("rise, fall", format!("{} s, {} s", params.rise_s, params.fall_s)),
@@ -239,17 +242,22 @@ impl View<'_> {
     }
 
     fn mouse(&self, pen: &mut Pen<'_>) {
-        let left = self.curve(pen, Device::Mouse, self.extras.pointer);
+        let (known, raw) = match &self.extras.pointer {
+            Some((known, raw)) => (known.as_str(), Some(*raw)),
+            None => ("not read yet", None),
+        };
+        let left = self.curve(pen, Device::Mouse, raw);
         let mut pen = pen.part(0, 0, left, pen.height());
         let params = &self.devices.profile.operator.mouse;
         let word = |value: &dyn std::fmt::Debug| format!("{value:?}").to_lowercase();
         pen.text(0, 0, "mouse", Role::Strong);
-        let abilities = &self.devices.survey.terminal.abilities;
-        let read = if abilities.has_pixels() { "in pixels" } else { "in cells" };
-        note(&mut pen, 0, 1, left, &format!("the terminal tells its place {read}"), Role::Dim);
+        note(&mut pen, 0, 1, left, known, Role::Dim);
+        note(&mut pen, 0, 2, left, "move it to try it", Role::Dim);
+        push(&mut pen, (0, 4, 15), raw.unwrap_or(0.0));
+        pen.text(34, 4, &signed(raw.unwrap_or(0.0), 5, 2), Role::You);
         rows(
             &mut pen,
-            3,
+            6,
             &[
                 ("steers by", format!("{}, {}", word(&params.steer), word(&params.along))),
                 ("full at", format!("{} screens/s", params.full_speed_screens_s)),
