@@ -45,9 +45,9 @@ pub(super) fn devices(words: &cli::Devices) -> Result<ExitCode, RunError> {
     let clock = WallClock::start();
     let hub = Hub::open(clock, &profile.operator.gamepad.sdl_mappings);
     if !words.json && io::stdin().is_terminal() && io::stdout().is_terminal() {
-        return on_screen(document, profile, hub, clock);
+        return on_screen(document, profile, &hub, clock);
     }
-    let survey = look_once(&profile, hub, clock);
+    let survey = look_once(&profile, hub.ok().as_ref(), clock);
     if words.json {
         say(&json(&survey)?)?;
     } else {
@@ -69,9 +69,9 @@ fn json(survey: &Survey) -> Result<String, RunError> {
 }
 
 /// What is there now, for a program or a file.
-fn look_once(profile: &Profile, hub: Result<Hub, NoPads>, mut clock: WallClock) -> Survey {
+fn look_once(profile: &Profile, hub: Option<&Hub>, mut clock: WallClock) -> Survey {
     let mut pads = Pads::new(&profile.operator.gamepad);
-    if let Ok(hub) = &hub {
+    if let Some(hub) = hub {
         let heard = hub.listen(clock.now());
         let settled = clock.now() + SETTLING;
         clock.wait_until(settled);
@@ -152,12 +152,12 @@ impl Bench for Here {
 fn on_screen(
     document: Document,
     profile: Profile,
-    hub: Result<Hub, NoPads>,
+    hub: &Result<Hub, NoPads>,
     clock: WallClock,
 ) -> Result<ExitCode, RunError> {
     let feed = Feed::new(Hands::new(&profile.operator.keyboard), clock);
     let mut devices = Devices::new(document, profile, PathBuf::from(PROFILES));
-    let heard = match &hub {
+    let heard = match hub {
         Ok(hub) => Some(hub.listen(clock.now())),
         Err(why) => {
             devices.hear_no_pads(why.to_string());

@@ -60,7 +60,8 @@ pub struct Holder {
 const BY_ID: &str = "/dev/serial/by-id";
 /// What answers a control loop has to wait no longer than, ms.
 const QUICK_MS: u32 = 2;
-/// Makers of the chips that braille displays share with laboratory boards: CH340, FTDI, CP210x.
+/// Makers of the chips that braille displays share with laboratory boards: WCH (`CH340`),
+/// FTDI, Silicon Labs (`CP210x`).
 const BRAILLE_LIKE: [u16; 3] = [0x1a86, 0x0403, 0x10c4];
 /// Makes udev read its rules again.
 const RELOAD: &str = "sudo udevadm control --reload && sudo udevadm trigger";
@@ -267,7 +268,7 @@ fn held(port: &Port, holder: &Holder) -> Problem {
     )
 }
 
-/// ModemManager sends modem commands to whatever is plugged in.
+/// `ModemManager` sends modem commands to whatever is plugged in.
 fn modem_manager(host: &Host, ports: &[Port]) -> Option<Problem> {
     let usb = ports.iter().find_map(|port| port.usb.as_ref())?;
     runs(host, "ModemManager").then(|| {

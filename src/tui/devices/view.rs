@@ -6,6 +6,7 @@ use super::{Devices, Gamepad, Page, Prompt, curve};
 use crate::backend::serial::ports::Port;
 use crate::host::Problem;
 use crate::operator::Device;
+use crate::operator::gamepad::Map;
 use crate::operator::gamepad::learn::{Learner, Step};
 use crate::tui::keys::{Hand, Screen};
 use crate::tui::palette::{Look, Role};
@@ -143,74 +144,9 @@ impl View<'_> {
         let raw = pad.steers.then_some(pad.steering.raw);
         let left = self.curve(pen, Device::Gamepad, raw);
         let mut pen = pen.part(0, 0, left, pen.height());
-        self.about_pad(&mut pen, pad, pads.len() - 1);
-        self.axes(&mut pen, pad);
-    }
-
-    /// A pad's name, GUID, mapping, rights and map.
-    fn about_pad(&self, pen: &mut Pen<'_>, pad: &Gamepad, others: usize) {
-        let steers = if pad.steers { "steers" } else { "is not the wanted one" };
-        let end = pen.text(0, 0, &cut(&pad.name, 30), Role::Strong);
-        pen.text(end + 1, 0, steers, Role::You);
-        let rights = match (&pad.node, pad.rights) {
-            (Some(node), Some(rights)) => {
-                let event = node.rsplit('/').next().unwrap_or(node);
-                format!("{event}: {}", rights.words())
-            }
-            _ => "rights unknown".to_owned(),
-        };
-        note(pen, 0, 1, pen.width(), &format!("{}; {rights}", pad.mapping), Role::Dim);
-        note(pen, 0, 2, pen.width(), &format!("GUID {}", pad.guid), Role::Dim);
         let map = &self.devices.profile.operator.gamepad.map;
-        let (mut x, mut y) = (0, 3);
-        for (purpose, button) in map.buttons() {
-            let name = button.map_or_else(|| "none".to_owned(), |button| button.to_string());
-            let is_held = pad.buttons.get(&name) == Some(&true);
-            let shown = if is_held { format!("[{name}]") } else { name };
-            if x + columns(purpose) + columns(&shown) + 1 > pen.width() {
-                (x, y) = (0, y + 1);
-            }
-            let end = pen.text(x, y, purpose, Role::Dim);
-            let role = if is_held { Role::Go } else { Role::Text };
-            x = pen.text(end + 1, y, &shown, role) + 2;
-        }
-        let held: Vec<&str> = pad
-            .buttons
-            .iter()
-            .filter_map(|(name, is_held)| is_held.then_some(name.as_str()))
-            .collect();
-        let held = if held.is_empty() { "no button".to_owned() } else { held.join(", ") };
-        let more = match others {
-            0 => String::new(),
-            1 => "; 1 more pad waits".to_owned(),
-            _ => format!("; {others} more pads wait"),
-        };
-        note(pen, 0, 5, pen.width(), &format!("held {held}{more}"), Role::Text);
-    }
-
-    /// Where the axes are, the one that steers first.
-    fn axes(&self, pen: &mut Pen<'_>, pad: &Gamepad) {
-        const FIRST: u16 = 7;
-        let steer = &pad.steering.axis;
-        let others = pad.axes.iter().filter(|(name, _)| *name != steer);
-        let all: Vec<(&String, f64)> = std::iter::once((steer, pad.steering.raw))
-            .chain(others.map(|(name, at)| (name, *at)))
-            .collect();
-        let rows = usize::from(pen.height().saturating_sub(FIRST));
-        let shown = if all.len() > rows { rows.saturating_sub(1) } else { all.len() };
-        for ((name, at), y) in all.iter().take(shown).zip(FIRST..) {
-            let role = if *name == steer { Role::Strong } else { Role::Text };
-            pen.text(0, y, &cut(name, 13), role);
-            push(pen, (VALUE, y, 7), *at);
-            let end = pen.text(VALUE + 18, y, &signed(*at, 5, 2), role);
-            if *name == steer {
-                pen.text(end + 1, y, "steers", Role::You);
-            }
-        }
-        if shown < all.len() {
-            let y = FIRST + u16::try_from(shown).unwrap_or(0);
-            pen.text(0, y, &format!("and {} axes more", all.len() - shown), Role::Dim);
-        }
+        about_pad(&mut pen, pad, map, pads.len() - 1);
+        axes(&mut pen, pad);
     }
 
     fn keyboard(&self, pen: &mut Pen<'_>) {
@@ -235,8 +171,8 @@ impl View<'_> {
             &[
                 ("push", format!("{} of the limit", params.push)),
                 ("rise, fall", format!("{} s, {} s", params.rise_s, params.fall_s)),
-                ("a tap", format!("{} s, where releases are guessed", params.tap_hold_s)),
-                ("a repeat", format!("{repeat} there")),
+                ("a tap", format!("{} s, releases untold", params.tap_hold_s)),
+                ("a repeat", format!("{repeat}, releases untold")),
             ],
         );
     }
@@ -398,6 +334,68 @@ impl View<'_> {
     }
 }
 
+/// A pad's name, GUID, mapping, rights and map.
+fn about_pad(pen: &mut Pen<'_>, pad: &Gamepad, map: &Map, others: usize) {
+    let steers = if pad.steers { "steers" } else { "is not the wanted one" };
+    let end = pen.text(0, 0, &cut(&pad.name, 30), Role::Strong);
+    pen.text(end + 1, 0, steers, Role::You);
+    let rights = match (&pad.node, pad.rights) {
+        (Some(node), Some(rights)) => {
+            let event = node.rsplit('/').next().unwrap_or(node);
+            format!("{event}: {}", rights.words())
+        }
+        _ => "rights unknown".to_owned(),
+    };
+    note(pen, 0, 1, pen.width(), &format!("{}; {rights}", pad.mapping), Role::Dim);
+    note(pen, 0, 2, pen.width(), &format!("GUID {}", pad.guid), Role::Dim);
+    let (mut x, mut y) = (0, 3);
+    for (purpose, button) in map.buttons() {
+        let name = button.map_or_else(|| "none".to_owned(), |button| button.to_string());
+        let is_held = pad.buttons.get(&name) == Some(&true);
+        let shown = if is_held { format!("[{name}]") } else { name };
+        if x + columns(purpose) + columns(&shown) + 1 > pen.width() {
+            (x, y) = (0, y + 1);
+        }
+        let end = pen.text(x, y, purpose, Role::Dim);
+        let role = if is_held { Role::Go } else { Role::Text };
+        x = pen.text(end + 1, y, &shown, role) + 2;
+    }
+    let held: Vec<&str> =
+        pad.buttons.iter().filter_map(|(name, is_held)| is_held.then_some(name.as_str())).collect();
+    let held = if held.is_empty() { "no button".to_owned() } else { held.join(", ") };
+    let more = match others {
+        0 => String::new(),
+        1 => "; 1 more pad waits".to_owned(),
+        _ => format!("; {others} more pads wait"),
+    };
+    note(pen, 0, 5, pen.width(), &format!("held {held}{more}"), Role::Text);
+}
+
+/// Where the axes are, the one that steers first.
+fn axes(pen: &mut Pen<'_>, pad: &Gamepad) {
+    const FIRST: u16 = 7;
+    let steer = &pad.steering.axis;
+    let others = pad.axes.iter().filter(|(name, _)| *name != steer);
+    let all: Vec<(&String, f64)> = std::iter::once((steer, pad.steering.raw))
+        .chain(others.map(|(name, at)| (name, *at)))
+        .collect();
+    let rows = usize::from(pen.height().saturating_sub(FIRST));
+    let shown = if all.len() > rows { rows.saturating_sub(1) } else { all.len() };
+    for ((name, at), y) in all.iter().take(shown).zip(FIRST..) {
+        let role = if *name == steer { Role::Strong } else { Role::Text };
+        pen.text(0, y, &cut(name, 13), role);
+        push(pen, (VALUE, y, 7), *at);
+        let end = pen.text(VALUE + 18, y, &signed(*at, 5, 2), role);
+        if *name == steer {
+            pen.text(end + 1, y, "steers", Role::You);
+        }
+    }
+    if shown < all.len() {
+        let y = FIRST + u16::try_from(shown).unwrap_or(0);
+        pen.text(0, y, &format!("and {} axes more", all.len() - shown), Role::Dim);
+    }
+}
+
 /// Labels and values, a row each.
 fn rows(pen: &mut Pen<'_>, top: u16, rows: &[(&str, String)]) {
     for ((label, value), y) in rows.iter().zip(top..) {
@@ -408,25 +406,20 @@ fn rows(pen: &mut Pen<'_>, top: u16, rows: &[(&str, String)]) {
 
 /// A port in two or three lines.
 fn port_lines(port: &Port) -> Vec<String> {
-    let mut first = port.path.clone();
-    if let Some(usb) = &port.usb {
-        let named = |name: &Option<String>| name.clone().map_or(String::new(), |n| format!(" {n}"));
-        let words = named(&usb.manufacturer) + &named(&usb.name);
-        first += &format!("  USB {:04x}:{:04x}{words}", usb.vendor, usb.product);
-        if let Some(serial) = &usb.serial {
-            first += &format!(", serial {serial}");
-        }
-    }
-    let group = port.group.as_deref().unwrap_or("?");
-    let mut second = format!("rights {}, group {group}", port.rights.words());
-    if let Some(holder) = &port.holder {
-        second += &format!(", open in {} ({})", holder.name, holder.pid);
-    }
-    if let Some(latency_ms) = port.latency_ms {
-        second += &format!(", latency {latency_ms} ms");
-    }
+    let usb = port.usb.as_ref().map_or_else(String::new, |usb| {
+        let names = [&usb.manufacturer, &usb.name].into_iter().flatten();
+        let names: Vec<&str> = names.map(String::as_str).collect();
+        let serial = usb.serial.as_ref().map_or_else(String::new, |no| format!(", serial {no}"));
+        format!("  USB {:04x}:{:04x} {}{serial}", usb.vendor, usb.product, names.join(" "))
+    });
     let by_id = port.by_id.as_ref().map(|name| format!("/dev/serial/by-id/{name}"));
-    [Some(first), by_id, Some(second)].into_iter().flatten().collect()
+    let group = port.group.as_deref().unwrap_or("?");
+    let rights = format!("rights {}, group {group}", port.rights.words());
+    let holder = port.holder.as_ref().map(|by| format!("open in {} ({})", by.name, by.pid));
+    let latency = port.latency_ms.map(|latency_ms| format!("latency {latency_ms} ms"));
+    let about: Vec<String> = [Some(rights), holder, latency].into_iter().flatten().collect();
+    let lines = [Some(format!("{}{usb}", port.path)), by_id, Some(about.join(", "))];
+    lines.into_iter().flatten().collect()
 }
 
 /// A problem and what mends it, in lines of at most `width`.
