@@ -612,8 +612,12 @@ fn the_devices_have_a_screen_that_is_left_with_q() {
     terminal.keys("\x1b[C");
     terminal.shows("hold a or d");
     terminal.shows("reported by the terminal");
-    terminal.keys("\x1b[D\x1b[D");
+    terminal.keys("\x1b[C");
+    terminal.shows("pointer in");
+    assert!(terminal.wrote("\x1b[?1003h"), "the mouse is not read on its page");
+    terminal.keys("\x1b[D\x1b[D\x1b[D");
     terminal.shows("key releases  yes");
+    assert!(terminal.wrote("\x1b[?1003l"), "the mouse is still read on other pages");
     terminal.keys("q");
     assert_eq!(terminal.code(), 0);
     terminal.is_given_back();

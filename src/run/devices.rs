@@ -20,7 +20,7 @@ use super::{RunError, say, signal_code, tell};
 use crate::backend::serial::ports;
 use crate::cli;
 use crate::clock::{Clock, WallClock};
-use crate::host::{Host, Login};
+use crate::host::{About, Host, Login, Problem};
 use crate::operator::gamepad::hub::{Heard, Hub, NoPads};
 use crate::operator::gamepad::rights::{self, Build};
 use crate::operator::gamepad::{Event, Pads};
@@ -47,7 +47,7 @@ pub(super) fn devices(words: &cli::Devices) -> Result<ExitCode, RunError> {
     if !words.json && io::stdin().is_terminal() && io::stdout().is_terminal() {
         return on_screen(document, profile, &hub, clock);
     }
-    let survey = look_once(&profile, hub.ok().as_ref(), clock);
+    let survey = look_once(&profile, &hub, clock);
     if words.json {
         say(&json(&survey)?)?;
     } else {
@@ -69,9 +69,9 @@ fn json(survey: &Survey) -> Result<String, RunError> {
 }
 
 /// What is there now, for a program or a file.
-fn look_once(profile: &Profile, hub: Option<&Hub>, mut clock: WallClock) -> Survey {
+fn look_once(profile: &Profile, hub: &Result<Hub, NoPads>, mut clock: WallClock) -> Survey {
     let mut pads = Pads::new(&profile.operator.gamepad);
-    if let Some(hub) = hub {
+    if let Ok(hub) = hub {
         let heard = hub.listen(clock.now());
         let settled = clock.now() + SETTLING;
         clock.wait_until(settled);
@@ -79,7 +79,7 @@ fn look_once(profile: &Profile, hub: Option<&Hub>, mut clock: WallClock) -> Surv
             pads.take(event, at);
         }
     }
-    let mut survey = Computer::default().survey(pads.present().len());
+    let mut survey = Computer::here(hub).survey(pads.present().len());
     // Only a person's terminal is asked; a script in the background would be stopped.
     let asked = if io::stdin().is_terminal() { probe().ok() } else { None };
     add_terminal(&mut survey, asked);
@@ -92,15 +92,20 @@ fn look_once(profile: &Profile, hub: Option<&Hub>, mut clock: WallClock) -> Surv
 struct Computer {
     host: Host,
     build: Build,
-}
-
-impl Default for Computer {
-    fn default() -> Self {
-        Self { host: Host::here(), build: Build::here() }
-    }
+    /// Why no pad can be heard.
+    no_pads: Option<String>,
 }
 
 impl Computer {
+    /// This one, with what came of reaching for its pads.
+    fn here<T>(hub: &Result<T, NoPads>) -> Self {
+        let no_pads = hub.as_ref().err().map(|why| match why {
+            NoPads::NotBuilt => why.to_string(),
+            NoPads::System(cause) => format!("gamepads cannot be reached: {cause}"),
+        });
+        Self { host: Host::here(), build: Build::here(), no_pads }
+    }
+
     /// Everything but the terminal, where the program hears so many pads.
     fn survey(&self, heard: usize) -> Survey {
         let host = &self.host;
@@ -109,6 +114,9 @@ impl Computer {
         let gamepad_nodes = rights::nodes(host);
         let serial_ports = ports::ports(host, &ports::listed(host));
         let mut problems = rights::problems(host, &login, self.build, &gamepad_nodes, heard);
+        if let Some(why) = self.no_pads.as_ref().filter(|_| problems.is_empty()) {
+            problems.push(Problem::new(About::Gamepad, why, rights::WITHOUT_UDEV));
+        }
         problems.extend(ports::problems(host, &login, &serial_ports));
         Survey { gamepad_nodes, serial_ports, problems, ..Survey::default() }
     }
@@ -157,14 +165,12 @@ fn on_screen(
 ) -> Result<ExitCode, RunError> {
     let feed = Feed::new(Hands::new(&profile.operator.keyboard), clock);
     let mut devices = Devices::new(document, profile, PathBuf::from(PROFILES));
-    let heard = match hub {
-        Ok(hub) => Some(hub.listen(clock.now())),
-        Err(why) => {
-            devices.hear_no_pads(why.to_string());
-            None
-        }
-    };
-    let mut here = Here { computer: Computer::default(), heard, shutdown: Shutdown::listen() };
+    let computer = Computer::here(hub);
+    if let Some(why) = &computer.no_pads {
+        devices.hear_no_pads(why.as_str());
+    }
+    let heard = hub.as_ref().ok().map(|hub| hub.listen(clock.now()));
+    let mut here = Here { computer, heard, shutdown: Shutdown::listen() };
     keep_panics_off_the_screen();
     let mut screen =
         Screen::take(feed, KeysFrom::Input).map_err(|error| RunError::Usage(error.to_string()))?;

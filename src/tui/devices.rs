@@ -110,6 +110,8 @@ pub struct Devices {
     /// Why no pad is heard.
     no_pads: Option<String>,
     survey: Survey,
+    /// Whether the files were looked at.
+    is_surveyed: bool,
     page: Page,
     learner: Option<Learner>,
     prompt: Option<Prompt>,
@@ -132,6 +134,7 @@ impl Devices {
             pressed: BTreeMap::new(),
             no_pads: None,
             survey: Survey::default(),
+            is_surveyed: false,
             page: Page::Hand(Device::Gamepad),
             learner: None,
             prompt: None,
@@ -188,6 +191,7 @@ impl Devices {
     /// What the files say now.
     pub fn take(&mut self, survey: Survey) {
         self.survey = survey;
+        self.is_surveyed = true;
     }
 
     /// The pads that are heard.

@@ -28,7 +28,7 @@ const BUTTONS: std::ops::RangeInclusive<usize> = 0x120..=0x13e;
 /// Gives pads to whoever sits at the computer.
 const RULE: &str = r#"KERNEL=="event*", SUBSYSTEM=="input", ENV{ID_INPUT_JOYSTICK}=="1", MODE="0660", TAG+="uaccess""#;
 /// Finds pads by looking at `/dev/input`, without udev.
-const WITHOUT_UDEV: &str = "GILRS_DISABLE_UDEV=1 coadapt devices    # and so with coadapt run";
+pub const WITHOUT_UDEV: &str = "GILRS_DISABLE_UDEV=1 coadapt devices    # and so with coadapt run";
 
 /// The gamepads that the kernel of `host` knows, whether or not they can be used.
 #[must_use]
@@ -114,6 +114,9 @@ pub fn problems(
     problems.extend(missing(host, nodes));
     if seen == 0 {
         problems.extend(udev(host, build));
+        if problems.is_empty() {
+            problems.extend(unheard(host, nodes));
+        }
     }
     problems
 }
@@ -195,6 +198,26 @@ fn udev(host: &Host, build: Build) -> Option<Problem> {
         .then(|| problem("udev does not run here (a container?): no pad is reported", WITHOUT_UDEV))
 }
 
+/// Everything looks well, and still no pad is heard.
+fn unheard(host: &Host, nodes: &[Node]) -> Option<Problem> {
+    match nodes.first() {
+        Some(node) => Some(problem(
+            format!("{} ({}) may be used, but is not heard", node.name, node.path),
+            WITHOUT_UDEV,
+        )),
+        None if host.is_remote() => Some(problem(
+            "no pad is plugged in at this computer, which you reach through SSH; one at the \
+             computer in front of you is relayed from there",
+            format!(
+                "coadapt run balance --operator gamepad:relay=unix:/tmp/pad    # here\n\
+                 coadapt pad-relay | ssh {} coadapt pad-relay --forward unix:/tmp/pad    # there",
+                host.text("/proc/sys/kernel/hostname").unwrap_or_else(|| "LAB-PC".to_owned())
+            ),
+        )),
+        None => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -257,7 +280,9 @@ mod tests {
         assert_eq!(names, ["Microsoft X-Box 360 pad", "Old stick"]);
         assert_eq!(nodes[0].path, "/dev/input/event7");
         assert!(nodes.iter().all(|node| node.is_there && node.rights.are_enough()));
-        assert_eq!(fake.problems(), []);
+        let host = Host::at(fake.0.path(), &[]);
+        assert_eq!(problems(&host, &Login::on(&host), FULL, &nodes, 2), []);
+        assert!(fake.problems()[0].what.contains("but is not heard"));
     }
 
     #[test]
@@ -290,7 +315,13 @@ mod tests {
         assert!(mend(fake.problems_with(none, &[])).contains("cargo build"));
         let bare = Build { gamepads: true, libudev: false };
         assert!(mend(fake.problems_with(bare, &[])).contains("apt install libudev1"));
-        assert_eq!(fake.problems_with(bare, &[("GILRS_DISABLE_UDEV", "1")]), []);
+        let off = fake.problems_with(bare, &[("GILRS_DISABLE_UDEV", "1")]);
+        assert!(off.iter().all(|problem| !problem.what.contains("libudev")), "{off:?}");
+        fake.file("proc/bus/input/devices", "");
+        let remote = fake.problems_with(FULL, &[("SSH_CONNECTION", "1 2 3 4")]);
+        assert!(mend(remote).contains("\ncoadapt pad-relay | ssh LAB-PC coadapt"));
+        assert_eq!(fake.problems(), []);
+        fake.file("proc/bus/input/devices", &[MOUSE, PAD, STICK].join("\n"));
         fs::remove_dir_all(fake.0.path().join("run")).unwrap();
         assert!(mend(fake.problems()).starts_with("GILRS_DISABLE_UDEV=1 coadapt"));
         fs::remove_file(fake.0.path().join("dev/input/event9")).unwrap();

@@ -17,6 +17,9 @@ const FRAME: Duration = Duration::from_millis(33);
 /// How often the files are looked at.
 const SURVEY: Seconds = Seconds(1.0);
 
+/// How long pads may take to say that they are there.
+const SETTLING: Seconds = Seconds(0.3);
+
 /// Does what the screen cannot: looks at the computer and listens to its pads.
 pub trait Bench {
     /// What is plugged in now, where `heard` pads are heard.
@@ -32,7 +35,8 @@ pub trait Bench {
 /// Shows the devices until the person leaves.
 pub fn show(screen: &mut Screen, bench: &mut dyn Bench, mut devices: Devices) -> End {
     let clock = screen.feed().clock;
-    let mut due = clock.now();
+    // Pads that are there need a moment to say so.
+    let mut due = clock.now() + SETTLING;
     loop {
         for (event, at) in bench.events() {
             devices.hear(&event, at);

@@ -86,6 +86,7 @@ impl View<'_> {
         let shown = self.devices.document.shown();
         pen.text(end + 3, 0, &format!("devices, as {} maps them", cut(shown, 36)), Role::Text);
         let words = match self.devices.survey.problems.len() {
+            _ if !self.devices.is_surveyed => "looking".to_owned(),
             0 => "nothing is in the way".to_owned(),
             1 => "1 problem".to_owned(),
             count => format!("{count} problems"),
@@ -133,7 +134,8 @@ impl View<'_> {
     fn gamepad(&self, pen: &mut Pen<'_>) {
         let pads = self.devices.gamepads();
         let Some(pad) = pads.iter().find(|pad| pad.steers).or_else(|| pads.first()) else {
-            let why = self.devices.no_pads.as_deref().unwrap_or("no gamepad is heard: plug one in");
+            let why = self.devices.no_pads.as_deref();
+            let why = why.unwrap_or("no gamepad is heard: plug one in");
             pen.text(0, 0, why, Role::Strong);
             for (node, y) in self.devices.survey.gamepad_nodes.iter().zip(1..) {
                 let words = format!("{}  {}, rights {}", node.name, node.path, node.rights.words());
