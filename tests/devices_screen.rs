@@ -35,7 +35,8 @@ impl Desk {
         }
         let profile = document.read().unwrap();
         let document = Document::find("balance", profiles).unwrap();
-        let devices = Devices::new(document, profile, profiles.to_owned());
+        let mut devices = Devices::new(document, profile, profiles.to_owned());
+        devices.take(Survey::default());
         Self { devices, push: 0.0, pointer: None, look: Look::default() }
     }
 

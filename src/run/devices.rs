@@ -44,7 +44,7 @@ pub(super) fn devices(words: &cli::Devices) -> Result<ExitCode, RunError> {
     let profile = read(&document)?;
     let clock = WallClock::start();
     let hub = Hub::open(clock, &profile.operator.gamepad.sdl_mappings);
-    if !words.json && io::stdin().is_terminal() && io::stdout().is_terminal() {
+    if !words.json && Screen::check(KeysFrom::Input).is_ok() {
         return on_screen(document, profile, &hub, clock);
     }
     let survey = look_once(&profile, &hub, clock);

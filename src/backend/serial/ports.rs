@@ -303,7 +303,7 @@ fn slow(port: &Port) -> Option<Problem> {
     ))
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
     use std::fs;

@@ -218,7 +218,7 @@ fn unheard(host: &Host, nodes: &[Node]) -> Option<Problem> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
     use std::fs;
