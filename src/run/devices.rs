@@ -80,8 +80,10 @@ fn look_once(profile: &Profile, hub: &Result<Hub, NoPads>, mut clock: WallClock)
         }
     }
     let mut survey = Computer::here(hub).survey(pads.present().len());
-    // Only a person's terminal is asked; a script in the background would be stopped.
-    let asked = if io::stdin().is_terminal() { probe().ok() } else { None };
+    // Only a person's terminal is asked: a script in the background would be stopped, and a
+    // dumb terminal would print the questions.
+    let is_dumb = std::env::var("TERM").is_ok_and(|term| term == "dumb");
+    let asked = if io::stdin().is_terminal() && !is_dumb { probe().ok() } else { None };
     add_terminal(&mut survey, asked);
     let nodes = &survey.gamepad_nodes;
     survey.gamepads = gamepads(&pads, &BTreeMap::new(), &profile.operator, nodes);
