@@ -212,7 +212,7 @@ mod parent {
 
     enum Hand {
         Keys,
-        Mouse,
+        Mouse { column: u32 },
         Pad { stream: Option<UnixStream>, pads: Pads, outlet: Outlet },
     }
 
@@ -230,7 +230,9 @@ mod parent {
             pads.take(Event::Connected(about), Seconds(0.0));
             Hand::Pad { stream: None, pads, outlet: Outlet::new(1) }
         };
-        for (name, hand) in [("keyboard", Hand::Keys), ("mouse", Hand::Mouse), ("gamepad", pad())] {
+        for (name, hand) in
+            [("keyboard", Hand::Keys), ("mouse", Hand::Mouse { column: 20 }), ("gamepad", pad())]
+        {
             Device { name, hand }.measure(tries);
         }
     }
@@ -298,9 +300,12 @@ mod parent {
             match &mut self.hand {
                 Hand::Keys if value == 0.0 => write(pipe, b"\x1b[1;1:3C"),
                 Hand::Keys => write(pipe, b"\x1b[1;1:1C"),
-                // A mouse that does not move rests; one that moves, moves by ten columns.
-                Hand::Mouse if value == 0.0 => {}
-                Hand::Mouse => write(pipe, b"\x1b[<35;40;10M\x1b[<35;50;10M"),
+                // A mouse that does not move rests; one that moves goes to the other side.
+                Hand::Mouse { .. } if value == 0.0 => {}
+                Hand::Mouse { column } => {
+                    *column = 80 - *column;
+                    write(pipe, format!("\x1b[<35;{column};10M").as_bytes());
+                }
                 Hand::Pad { stream, pads, outlet } => {
                     let axis = Event::Axis { pad: Id(0), axis: Axis::LeftStickX, value };
                     pads.take(axis, Seconds(0.0));
@@ -330,7 +335,9 @@ mod parent {
                     k += 1;
                     match &mut self.hand {
                         Hand::Keys => burst.extend(b"\x1b[1;1:2C"),
-                        Hand::Mouse => burst.extend(format!("\x1b[<35;{};10M", 1 + k % 80).bytes()),
+                        Hand::Mouse { .. } => {
+                            burst.extend(format!("\x1b[<35;{};10M", 1 + k % 80).bytes())
+                        }
                         Hand::Pad { pads, outlet, .. } => {
                             let value = f64::from(k % 100) / 100.0;
                             let axis = Event::Axis { pad: Id(0), axis: Axis::LeftStickX, value };

@@ -182,6 +182,8 @@ fn unknown_words_are_told_what_is_known() {
     refuses(&desk, &format!("{RUN} --phases dance"), &["dance", "autonomous"]);
     refuses(&desk, &format!("{RUN} --phases main,introduction"), &["session.phases"]);
     refuses(&desk, run, &["no keyboard", "--operator simulated:average"]);
+    let mouse = format!("{run} --operator mouse");
+    refuses(&desk, &mouse, &["no mouse", "--operator simulated:average"]);
     refuses(&desk, "run --headless", &["PROFILE"]);
     refuses(&desk, "dance", &["dance"]);
     refuses(&desk, "run --headless --resume nowhere", &["nowhere", "no session"]);

@@ -106,7 +106,7 @@ impl Desk {
     fn picture_on(&self, width: u16, height: u16, look: Look) -> TestBackend {
         let extras = Extras {
             look,
-            key_releases: "estimated from key repeats inside tmux, up to 120 ms late",
+            key_releases: "estimated from key repeats",
             pointer: "pointer in pixels (1600 × 960)",
             hands: self.hands,
             time_s: 0.0,

@@ -161,7 +161,9 @@ fn sweep(terminal: &Terminal, columns: impl Iterator<Item = u16>) {
 fn the_mouse_pushes_as_it_moves_and_not_when_it_rests() {
     let mut terminal = moused(Answers::Plainly, "");
     assert!(!terminal.wrote("\x1b[?1016h"), "nobody offered pixels");
-    terminal.shows("cells (80 × 24)");
+    terminal.keys("?");
+    terminal.shows("Steered by mouse, pointer in cells (80 × 24), not moved yet.");
+    terminal.keys("?");
     sweep(&terminal, 10..60);
     terminal.shows_that("no push", |screen| push(screen) == Some(0.0));
     let pushed = |is: fn(f64) -> bool| terminal.pushes(FOLDER).into_iter().any(is);
@@ -194,13 +196,16 @@ fn the_mouse_is_read_in_pixels_where_the_terminal_offers_them() {
     terminal
         .shows_that("a small push", |_| terminal.column(FOLDER, "raw").into_iter().any(is_fine));
     terminal.resize(100, 30);
-    terminal.shows("pixels (1000 × 600)");
+    terminal.keys("?");
+    terminal.shows("Steered by mouse, pointer in pixels (1000 × 600).");
     end(&terminal);
     assert_eq!(terminal.code(), 0);
     terminal.is_given_back();
-    let devices = &terminal.session(FOLDER)["devices"];
-    assert_eq!(devices[1], "mouse, pointer in pixels (800 × 480)");
-    assert_eq!(devices[2], "mouse, pointer in pixels (1000 × 600)");
+    let events = fs::read_to_string(terminal.at(FOLDER).join("events.csv")).unwrap();
+    for size in ["800 × 480", "1000 × 600"] {
+        let words = format!("device,\"mouse, pointer in pixels ({size})\"");
+        assert!(events.contains(&words), "{events}");
+    }
 }
 
 #[test]
@@ -234,8 +239,8 @@ fn the_mouse_is_given_back_on_every_way_out() {
 #[test]
 fn a_flood_of_movements_drowns_no_key() {
     let mut terminal = moused(Answers::WithPixels, "");
-    let flood: String = (0..10_000).map(|k| format!("\x1b[<35;{};9M", 1 + k % 800)).collect();
-    terminal.keys(&flood);
+    let moves: Vec<String> = (0..10_000).map(|k| format!("\x1b[<35;{};9M", 1 + k % 800)).collect();
+    terminal.keys(&moves.concat());
     terminal.keys("p");
     terminal.shows("progress hidden");
     end(&terminal);
@@ -265,11 +270,17 @@ fn the_mouse_is_tried_before_a_session_and_only_then_read() {
 #[test]
 fn within_tmux_the_keyboard_says_what_it_costs() {
     let variables = vec![("TMUX", "/tmp/tmux-0/default,1,0"), ("TERM", "tmux-256color")];
+    let mut form = Seat { variables: variables.clone(), ..Seat::default() }.open("");
+    form.shows("key releases up to 120 ms late inside tmux");
+    form.keys("t");
+    form.shows("hold the arrows; releases up to 120 ms late inside tmux");
+    form.keys("\x03");
+    assert_eq!(form.code(), 0);
     let mut terminal = Seat { variables, columns: 120, rows: 40, ..Seat::default() }.open(CALM);
     terminal.shows("Enter   begin");
+    terminal.shows("inside tmux, up to 120 ms late");
     terminal.keys("\r");
     terminal.goes();
-    terminal.shows("inside tmux, up to 120 ms late");
     end(&terminal);
     assert_eq!(terminal.code(), 0);
     let session = terminal.session(FOLDER);

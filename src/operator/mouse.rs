@@ -28,6 +28,17 @@ pub enum Steer {
     Position,
 }
 
+impl Steer {
+    /// What it does, in words for the person.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Velocity => "the pointer's velocity is the force",
+            Self::Position => "the plant is drawn to the pointer's place",
+        }
+    }
+}
+
 /// Along which side of the screen the pointer is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -159,15 +170,19 @@ impl Mouse {
         self.badge.clone()
     }
 
-    /// Says how finely the pointer is known, and whether it was seen at all.
-    fn tell(&mut self) {
-        let grid = self.pointer.grid();
-        if let Some(grid) = grid.filter(|_| grid != self.told) {
-            self.badge.say(format!("mouse, {grid}"));
-            self.told = Some(grid);
-        }
+    /// Says how finely the pointer is known, and whether it was seen at all; returns the former
+    /// if it is new.
+    fn tell(&mut self) -> Option<String> {
         let is_seen = self.pointer.last_event().is_some();
         self.badge.set_state(if is_seen { "" } else { "not moved yet" });
+        let grid = self.pointer.grid();
+        if grid == self.told {
+            return None;
+        }
+        self.told = grid;
+        let words = format!("mouse, {}", grid?);
+        self.badge.say(&words);
+        Some(words)
     }
 
     /// The action at `now`, and the deflection that it comes from.
@@ -188,9 +203,9 @@ impl Operator for Mouse {
     /// A mouse that moves through the countdown goes on moving.
     fn begin(&mut self, _place: Place, _practice: Practice) {}
 
+    /// Numbers mean more or less by how finely the pointer is known: `events.csv` has it.
     fn news(&mut self, _now: Seconds) -> Option<News> {
-        self.tell();
-        None
+        self.tell().map(News::Remark)
     }
 
     fn intent(&mut self, view: View<'_>) -> Intent {
@@ -234,9 +249,19 @@ mod tests {
                 "mouse, pointer in cells (101 × 101), not moved yet"
             );
             mouse.pointer.moves_to(50, 50, mouse.clock.now());
-            mouse.news(Seconds(0.0));
+            assert_eq!(mouse.news(Seconds(0.0)), None);
             assert_eq!(mouse.badge().words_now(), "mouse, pointer in cells (101 × 101)");
         }
+    }
+
+    #[test]
+    fn another_grid_is_news() {
+        let mut mouse = mouse(&Params::default());
+        mouse.pointer.set_grid(Some(Grid::of(80, 24, Some((10, 20)))));
+        let words = "mouse, pointer in pixels (800 × 480)".to_owned();
+        assert_eq!(mouse.news(Seconds(0.0)), Some(News::Remark(words.clone())));
+        assert_eq!(mouse.news(Seconds(0.0)), None);
+        assert_eq!(mouse.badge().words(), words);
     }
 
     #[test]

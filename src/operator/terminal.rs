@@ -150,6 +150,15 @@ impl Hands {
         (format!("{known}{inside}"), format!("up to {:.0} ms late", late.0 * 1000.0))
     }
 
+    /// The same in few words, after "releases"; what lies between and what it costs comes first.
+    #[must_use]
+    pub fn short_release_words(&self) -> String {
+        match (self.release_words(), self.inside) {
+            ((_, late), Some(inside)) if !late.is_empty() => format!("{late} inside {inside}"),
+            ((known, _), _) => known,
+        }
+    }
+
     /// The time of the last steering key's event, if there was one.
     #[must_use]
     pub fn last_event(&self) -> Option<Seconds> {
@@ -293,6 +302,7 @@ mod tests {
         let badge = keyboard.badge();
         assert_eq!(badge.words(), "keyboard, releases estimated from key repeats inside tmux");
         assert!(badge.words_now().ends_with("inside tmux, up to 120 ms late"));
+        assert_eq!(hands.short_release_words(), "up to 120 ms late inside tmux");
         for k in 0..20 {
             hands.press(Direction::Left, Seconds(f64::from(k) * 0.04));
         }
@@ -301,6 +311,7 @@ mod tests {
         hands.set_releases_known(true);
         keyboard.news(Seconds(0.0));
         assert_eq!(badge.words_now(), "keyboard, releases reported by the terminal");
+        assert_eq!(hands.short_release_words(), "reported by the terminal");
     }
 
     #[test]

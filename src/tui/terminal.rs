@@ -216,13 +216,11 @@ fn read(sender: &SyncSender<Heard>, feed: &Feed, stop: &AtomicBool) {
     };
     let is_stopped = || stop.load(Ordering::SeqCst);
     let asked = Tty::open().and_then(|tty| probe::ask(&tty, feed.clock, pass, is_stopped));
-    match asked {
-        Ok(abilities) => report_releases(&abilities, feed),
-        Err(_) => {
-            let _ = sender.try_send(Heard::Lost);
-            return;
-        }
-    }
+    let Ok(abilities) = asked else {
+        let _ = sender.try_send(Heard::Lost);
+        return;
+    };
+    report_releases(&abilities, feed);
     while !is_stopped() {
         match event::poll(Duration::from_millis(100))
             .and_then(|ready| if ready { event::read().map(Some) } else { Ok(None) })

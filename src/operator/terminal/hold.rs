@@ -546,7 +546,7 @@ mod tests {
             repeat_hold_s in proptest::option::of(0.02..0.2_f64),
             events in proptest::collection::vec((0..12_usize, 0.0..0.3_f64), 0..80),
         ) {
-            let timing = Timing { rise_s, fall_s, repeat_hold_s, ..TIMING };
+            let timing = Timing { repeat_hold_s, rise_s, fall_s, ..TIMING };
             let (order, waits): (Vec<_>, Vec<_>) = events.into_iter().unzip();
             let happenings: Vec<_> = order.into_iter().map(|which| HAPPENINGS[which]).collect();
             prop_assert_eq!(leaves_nothing(timing, &happenings, &waits), Ok(()));

@@ -87,9 +87,8 @@ impl Trial {
                 hands.push(now)
             }
         };
-        let (known, late) = hands.release_words();
         Self {
-            key_releases: if late.is_empty() { known } else { format!("{known}, {late}") },
+            key_releases: hands.short_release_words(),
             pointer: pointer.grid().map_or(String::new(), |grid| grid.to_string()),
             push: is_tried.then(push),
         }

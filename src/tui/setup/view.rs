@@ -7,7 +7,6 @@ use super::lines::{Light, Signs, choice, command, input, note, push, slider, tic
 use super::prompt::Prompt;
 use super::{Field, Setup, Shelf};
 use crate::operator::Choice;
-use crate::operator::mouse::Steer;
 use crate::profile::{Experiment, WantedMode};
 use crate::session::plan::Wanted;
 use crate::tui::keys::{Hand, Screen};
@@ -230,7 +229,7 @@ impl View<'_> {
                 note(pen, ABOUT, 11, FORM, about, Role::Dim);
             }
             Choice::Mouse => {
-                let about = mouse_words(setup.profile.operator.mouse.steer);
+                let about = setup.profile.operator.mouse.steer.words();
                 note(pen, ABOUT, 11, FORM, about, Role::Dim);
             }
             Choice::Simulated(skill, kind) => {
@@ -490,13 +489,5 @@ fn say(pen: &mut Pen<'_>, y: u16, message: &str, role: Role) {
     note(pen, LABEL, y, LABEL + width, first, role);
     if !rest.is_empty() {
         note(pen, LABEL, y + 1, LABEL + width, &rest.join(" "), role);
-    }
-}
-
-/// How the mouse steers, in a line.
-const fn mouse_words(steer: Steer) -> &'static str {
-    match steer {
-        Steer::Velocity => "the pointer's velocity is the force",
-        Steer::Position => "the plant is drawn to the pointer's place",
     }
 }

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 /// What is known of the terminal: from its answers, from the environment, from the system.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an answer of its own")]
 pub struct Abilities {
     /// Whether it answered at all; if not, what it was asked about counts as missing.
     pub answered: bool,

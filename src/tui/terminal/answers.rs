@@ -13,6 +13,7 @@ const LONGEST: usize = 256;
 
 /// Answers so far.
 #[derive(Clone, Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an answer of its own")]
 pub struct Answers {
     /// What may be the beginning of something.
     pending: Vec<u8>,
@@ -139,7 +140,7 @@ fn numbers(text: &str) -> Vec<u16> {
 /// What `bytes` begin with.
 fn piece(bytes: &[u8]) -> Piece {
     match bytes {
-        [] | [0x1b] => Piece::Cut,
+        [] | [0x1b] | [0x1b, b'O'] => Piece::Cut,
         [0x1b, 0x1b, ..] => Piece::Esc,
         [0x1b, b'[', rest @ ..] => {
             let is_inner = |byte: &u8| matches!(byte, 0x20..=0x3f);
@@ -153,7 +154,6 @@ fn piece(bytes: &[u8]) -> Piece {
                 Some(_) => Piece::Noise(2 + inner),
             }
         }
-        [0x1b, b'O'] => Piece::Cut,
         [0x1b, b'O', letter, ..] => Piece::Ss3(*letter),
         // A string of the terminal's, up to its end.
         [0x1b, b']' | b'P' | b'_' | b'^', rest @ ..] => {
