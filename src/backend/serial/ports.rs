@@ -303,7 +303,8 @@ fn slow(port: &Port) -> Option<Problem> {
     ))
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
     use std::fs;

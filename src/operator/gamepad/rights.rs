@@ -218,7 +218,8 @@ fn unheard(host: &Host, nodes: &[Node]) -> Option<Problem> {
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
     use std::fs;
