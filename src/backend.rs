@@ -1,6 +1,7 @@
 //! Where the plant lives: in the computer or at the end of a wire.
 
 pub mod safety;
+pub mod serial;
 pub mod simulated;
 
 use crate::random::Place;

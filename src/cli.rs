@@ -16,6 +16,7 @@ Examples:
   coadapt run --headless --resume logs/S07/001-balance-simultaneous
   coadapt fit data.csv --inputs a,b --outputs u a learner on a table, offline
   coadapt profile show balance                  every key, its value and its origin
+  coadapt devices                               pads, ports, terminal; maps a gamepad
 
 Results go to standard output, messages to standard error.
 Exit codes: 0 done, 1 failed, 2 wrong usage or input, 130 interrupted, 143 terminated.";
@@ -47,6 +48,8 @@ pub enum Command {
     /// Look at profiles.
     #[command(subcommand)]
     Profile(Profile),
+    /// Gamepads, serial ports and the terminal: what is there, live, and what mends problems.
+    Devices(Devices),
 }
 
 /// The words of `run`.
@@ -239,6 +242,26 @@ pub struct Looked {
     /// Change a value of the profile, such as `plant.pole_length_m=0.6`.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
     pub set: Vec<(String, String)>,
+}
+
+const DEVICES_HELP: &str = "\
+On a terminal it is a screen: pages of gamepad, keyboard, mouse, serial ports and terminal, live,
+with the profile's response curves; m learns a gamepad's map by moving it, s saves it to a profile.
+Elsewhere, or with --json, what is there is printed. Problems are findings: the exit code is 0.";
+
+/// The words of `devices`.
+#[derive(Args, Debug)]
+#[command(after_help = DEVICES_HELP)]
+pub struct Devices {
+    /// The profile whose maps and curves apply: a name in `profiles/` or built in, or a path.
+    #[arg(default_value = "balance")]
+    pub profile: String,
+    /// Change a value of the profile, such as `operator.gamepad.shape.exponent=2`.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
+    /// Print one JSON object instead of sentences, and show no screen.
+    #[arg(long)]
+    pub json: bool,
 }
 
 fn key_value(text: &str) -> Result<(String, String), String> {

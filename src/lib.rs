@@ -26,21 +26,22 @@
 //! | `random` | seeded streams of chance | |
 //! | `signal` | state, features, action, time | |
 //! | every room below | | `check`, `random`, `signal` |
+//! | `host` | the computer: who is logged in, what may be opened | |
 //! | `clock` | wall and virtual time; nobody else reads a clock | |
 //! | `plant` | equations of motion | |
 //! | `learner` | what the robot knows | |
 //! | `sharing` | mixing, success, share, regions | |
 //! | `teaching` | what the learner is given | |
 //! | `session` | subjects, phases, rollouts, and their order | |
-//! | `operator` | who steers: hands, scripts, simulated people | `plant`, `clock` |
+//! | `operator` | who steers: hands, scripts, simulated people | `plant`, `clock`, `host` |
 //! | `task` | what a plant is used for | `plant`, `sharing` |
-//! | `backend` | the plant, real or simulated, within its limits | `plant`, `clock` |
+//! | `backend` | the plant, real or simulated, within its limits | `plant`, `clock`, `host` |
 //! | `record` | the files of a session | `learner`, `session`, `clock`, `sharing` |
 //! | `profile` | an experiment's parameters, from a file | `plant`, `learner`, `sharing`, `teaching`, `session`, `operator`, `task`, `backend`, `record` |
 //! | `control` | the control cycle, and what others see of it | `clock`, `plant`, `learner`, `sharing`, `teaching`, `session`, `operator`, `task`, `backend`, `record` |
 //! | `report` | measures, figures, statistics | `record`, `task`, `learner`, `session`, `sharing` |
 //! | `study` | many runs without a screen | `clock`, `plant`, `learner`, `sharing`, `teaching`, `session`, `operator`, `task`, `backend`, `record`, `profile`, `control`, `report` |
-//! | `tui` | screens that draw plain data | `control::snapshot`, `report`, `record`, `profile`, `session`, `task`, `operator`, `backend`, `sharing`, `learner`, `clock` |
+//! | `tui` | screens that draw plain data | `control::snapshot`, `report`, `record`, `profile`, `session`, `task`, `operator`, `backend`, `sharing`, `learner`, `clock`, `host` |
 //! | `cli` | the words of the command line | `learner`, `sharing`, `session`, `operator`, `backend`, `record`, `profile` |
 //! | `run` | where everything is put together | every room above |
 //! | `main` | the doorbell | `cli`, `run` |
@@ -50,6 +51,7 @@ pub mod check;
 pub mod cli;
 pub mod clock;
 pub mod control;
+pub mod host;
 pub mod learner;
 pub mod operator;
 pub mod plant;

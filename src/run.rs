@@ -1,6 +1,7 @@
 //! The composition root: the one room that knows every other.
 
 mod choose;
+mod devices;
 mod evaluate;
 mod fit;
 pub mod outcome;
@@ -69,6 +70,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::PadRelay(words)) => pad_relay::pad_relay(words),
         Some(Command::Profile(profile)) => words::profile(profile),
+        Some(Command::Devices(words)) => devices::devices(words),
     }
 }
 

@@ -11,6 +11,7 @@
 pub mod app;
 pub mod briefing;
 pub mod canvas;
+pub mod devices;
 pub mod help;
 pub mod keys;
 pub mod live;

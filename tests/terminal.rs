@@ -615,3 +615,38 @@ fn no_row_is_lost_as_fast_as_it_can() {
     assert_eq!(rows.lines().count() - 1, implied);
     assert_eq!(episodes.lines().count(), 1 + 100 + 100);
 }
+
+#[test]
+fn the_devices_have_a_screen_that_is_left_with_q() {
+    let mut terminal = Seat { answers: Answers::WithKitty, ..Seat::default() }.open("devices");
+    terminal.shows("serial ports");
+    terminal.keys("\x1b[C");
+    terminal.shows("hold a or d");
+    terminal.shows("reported by the terminal");
+    terminal.keys("\x1b[100u");
+    terminal.shows("+0.50");
+    terminal.keys("\x1b[100;1:3u");
+    terminal.shows_that("the dot came back", |screen| !screen.contains("+0.50"));
+    terminal.keys("\x1b[C");
+    terminal.shows("pointer in");
+    assert!(terminal.wrote("\x1b[?1003h"), "the mouse is not read on its page");
+    terminal.keys("\x1b[D\x1b[D\x1b[D");
+    terminal.shows("key releases  yes");
+    assert!(terminal.wrote("\x1b[?1003l"), "the mouse is still read on other pages");
+    terminal.keys("q");
+    assert_eq!(terminal.code(), 0);
+    terminal.is_given_back();
+}
+
+#[test]
+fn questions_to_the_terminal_do_not_get_into_what_is_piped() {
+    let seat =
+        Seat { answers: Answers::WithKitty, output: Some("devices.json"), ..Seat::default() };
+    let mut terminal = seat.open("devices --json");
+    assert_eq!(terminal.code(), 0);
+    let text = fs::read(terminal.at("devices.json")).unwrap();
+    let devices: serde_json::Value = serde_json::from_slice(&text).unwrap();
+    assert_eq!(devices["schema"], 1);
+    assert_eq!(devices["terminal"]["key_releases"], true);
+    assert!(terminal.wrote("\x1b[?u"), "the terminal was not asked");
+}

@@ -6,10 +6,12 @@
 pub mod events;
 pub mod feel;
 pub mod hub;
+pub mod learn;
 pub mod link;
 mod map;
 pub mod pads;
 pub mod relay;
+pub mod rights;
 mod source;
 
 pub use map::{Axis, Button, Map};

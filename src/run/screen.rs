@@ -36,7 +36,7 @@ use crate::tui::terminal::{Feed, KeysFrom, Mouse, Screen, give_back, inside, is_
 const PROFILES: &str = "profiles";
 
 /// What a panic said while the screen was up, kept until the terminal is given back.
-static LAST_WORDS: Mutex<Option<String>> = Mutex::new(None);
+pub(super) static LAST_WORDS: Mutex<Option<String>> = Mutex::new(None);
 
 /// Opens the set-up screen, or the session that the command line asks for.
 pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
@@ -115,7 +115,7 @@ fn keys_of(run: Option<&cli::Run>) -> KeysFrom {
 }
 
 /// A panic may say its words only after the terminal was given back.
-fn keep_panics_off_the_screen() {
+pub(super) fn keep_panics_off_the_screen() {
     let previous = panic::take_hook();
     panic::set_hook(Box::new(move |info| {
         if is_taken() {

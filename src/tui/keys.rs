@@ -15,11 +15,14 @@ pub enum Screen {
     Live,
     /// A session's results.
     Results,
+    /// What is plugged in.
+    Devices,
 }
 
 impl Screen {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Setup, Self::Briefing, Self::Live, Self::Results];
+    pub const ALL: [Self; 5] =
+        [Self::Setup, Self::Briefing, Self::Live, Self::Results, Self::Devices];
 
     /// The heading in the help.
     #[must_use]
@@ -29,6 +32,7 @@ impl Screen {
             Self::Briefing => "instruction and break",
             Self::Live => "live",
             Self::Results => "results",
+            Self::Devices => "devices",
         }
     }
 }
@@ -52,6 +56,12 @@ pub enum Action {
     Save,
     /// Try the controls without a session.
     TryHands,
+    /// Learn a gamepad's map.
+    Learn,
+    /// To what stands above,
+    Up,
+    /// or below.
+    Down,
     /// Go on with a session that was cut off.
     Resume,
     /// Emergency stop.
@@ -119,7 +129,7 @@ const fn elsewhere(
 pub const BINDINGS: &[Binding] = {
     use Action as A;
     use KeyCode::{BackTab, Char, Down, Enter, Esc, F, Left, Right, Tab, Up};
-    use Screen::{Briefing, Live, Results, Setup};
+    use Screen::{Briefing, Devices, Live, Results, Setup};
     &[
         bind(Setup, &[Tab, Down], "Tab ↓", "next", "to the next field", A::Next),
         bind(Setup, &[BackTab, Up], "Shift-Tab ↑", "", "to the field before", A::Previous),
@@ -170,6 +180,16 @@ pub const BINDINGS: &[Binding] = {
         bind(Results, &[Enter], "Enter", "new session", "back to the set-up", A::Begin),
         bind(Results, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
         bind(Results, &[Char('q'), Esc], "q", "quit", "quit", A::Quit),
+        //
+        bind(Devices, &[Right, Tab], "←→", "device", "the next device; also Tab", A::Next),
+        bind(Devices, &[Left, BackTab], "←", "", "the one before", A::Previous),
+        bind(Devices, &[Down], "↓", "", "more of what is to be done", A::Down),
+        bind(Devices, &[Up], "↑", "", "back up", A::Up),
+        bind(Devices, &[Char('m')], "m", "map the pad", "learn the gamepad's map", A::Learn),
+        bind(Devices, &[Char('s')], "s", "save", "save what was learned to a profile", A::Save),
+        elsewhere(Devices, "a d", "", "try the keyboard, on its page; also h l"),
+        bind(Devices, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
+        bind(Devices, &[Char('q'), Esc], "q", "quit", "quit", A::Quit),
     ]
 };
 
@@ -200,6 +220,8 @@ pub fn action(screen: Screen, event: KeyEvent) -> Option<Action> {
             | Action::Previous
             | Action::Left
             | Action::Right
+            | Action::Up
+            | Action::Down
             | Action::MoreSensitive
             | Action::LessSensitive
     );

@@ -10,7 +10,7 @@
 mod edit;
 mod field;
 mod handle;
-mod lines;
+pub(super) mod lines;
 mod prompt;
 mod view;
 
@@ -23,6 +23,8 @@ use edit::Drafts;
 use prompt::Prompt;
 
 pub use field::Field;
+pub(super) use handle::type_into;
+pub(super) use prompt::file_in;
 pub use view::{Extras, draw};
 
 /// What is on disk, as far as the screen shows it; the caller keeps it fresh.

@@ -256,11 +256,7 @@ fn report_releases(abilities: &Abilities, feed: &Feed) {
 pub fn look(wanted: profile::Glyphs) -> Look {
     let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     let palette = if set("NO_COLOR").is_some() { Palette::Plain } else { Palette::Colours };
-    let locale = set("LC_ALL").or_else(|| set("LC_CTYPE")).or_else(|| set("LANG"));
-    let speaks_unicode = locale.is_some_and(|locale| {
-        let locale = locale.to_ascii_lowercase();
-        locale.contains("utf-8") || locale.contains("utf8")
-    });
+    let speaks_unicode = speaks_unicode(set);
     let is_console = set("TERM").is_some_and(|term| term == "linux");
     let glyphs = match wanted {
         profile::Glyphs::Braille => Glyphs::Braille,
@@ -269,4 +265,14 @@ pub fn look(wanted: profile::Glyphs) -> Look {
         profile::Glyphs::Ascii | profile::Glyphs::Auto => Glyphs::Ascii,
     };
     Look { glyphs, palette }
+}
+
+/// Whether the locale is one of UTF-8, with `get` for a variable that is set and not empty.
+#[must_use]
+pub fn speaks_unicode(get: impl Fn(&str) -> Option<String>) -> bool {
+    let locale = get("LC_ALL").or_else(|| get("LC_CTYPE")).or_else(|| get("LANG"));
+    locale.is_some_and(|locale| {
+        let locale = locale.to_ascii_lowercase();
+        locale.contains("utf-8") || locale.contains("utf8")
+    })
 }

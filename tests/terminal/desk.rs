@@ -39,12 +39,14 @@ pub struct Seat {
     pub answers: Answers,
     pub variables: Vec<(&'static str, &'static str)>,
     pub desk: Option<tempfile::TempDir>,
+    /// The file in the desk's folder that standard output goes to, in place of the terminal.
+    pub output: Option<&'static str>,
 }
 
 impl Default for Seat {
     fn default() -> Self {
         let answers = Answers::Plainly;
-        Self { columns: 80, rows: 24, answers, variables: Vec::new(), desk: None }
+        Self { columns: 80, rows: 24, answers, variables: Vec::new(), desk: None, output: None }
     }
 }
 
@@ -72,7 +74,15 @@ impl Seat {
     pub fn open(self, line: &str) -> Terminal {
         let desk = self.desk.unwrap_or_else(|| tempfile::tempdir().unwrap());
         let pair = native_pty_system().openpty(size(self.columns, self.rows)).unwrap();
-        let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_coadapt"));
+        let program = env!("CARGO_BIN_EXE_coadapt");
+        let mut command = match self.output {
+            None => CommandBuilder::new(program),
+            Some(file) => {
+                let mut shell = CommandBuilder::new("/bin/sh");
+                shell.args(["-c", &format!("exec \"$0\" \"$@\" > {file}"), program]);
+                shell
+            }
+        };
         command.args(line.split_whitespace());
         command.cwd(desk.path());
         command.env_clear();

@@ -137,6 +137,13 @@ impl Pads {
         }
     }
 
+    /// From now on keeps to the map in `params`; who steers stays.
+    pub fn remap(&mut self, params: &Params) {
+        (self.map, self.centre) = (params.map, params.centre);
+        let held = self.steering().and_then(|pad| pad.axes.get(&self.map.steer).copied());
+        self.grip = held.map_or(Grip::Idle, |value| self.grip_at(value));
+    }
+
     /// The pads that are plugged in, in the order in which they came.
     #[must_use]
     pub fn present(&self) -> &[Pad] {

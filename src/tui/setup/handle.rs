@@ -229,7 +229,7 @@ impl Setup {
 }
 
 /// Types `key`; into a `fresh` text a letter takes the place of all.
-fn type_into(text: &mut Input, key: KeyEvent, fresh: bool) {
+pub(in crate::tui) fn type_into(text: &mut Input, key: KeyEvent, fresh: bool) {
     let key = match key.code {
         // Terminals that tell keys apart may say Shift and the small letter.
         KeyCode::Char(c) if key.modifiers == KeyModifiers::SHIFT => {

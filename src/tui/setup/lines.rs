@@ -8,7 +8,7 @@ use crate::tui::pen::{Pen, columns};
 use crate::tui::text::{cut, place, real};
 
 /// The few signs of the form, also where only 7-bit characters can be shown.
-pub(super) struct Signs {
+pub(in crate::tui) struct Signs {
     /// Beside the label of the focused field.
     pub here: &'static str,
     /// Around a choice.
@@ -47,7 +47,7 @@ impl Signs {
 
 /// How a value is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Light {
+pub(in crate::tui) enum Light {
     /// Another field has the focus.
     Off,
     /// The focus is here: reversed.
@@ -84,7 +84,7 @@ pub(super) fn tick(pen: &mut Pen<'_>, x: u16, y: u16, on: bool, word: &str, ligh
 
 /// Writes a text of at most `width` columns, scrolled to its cursor; returns the column
 /// after it. A `fresh` text is reversed as a whole, since typing replaces it.
-pub(super) fn input(
+pub(in crate::tui) fn input(
     pen: &mut Pen<'_>,
     (x, y, width): (u16, u16, u16),
     text: &Input,
@@ -149,7 +149,7 @@ pub(super) fn slider(pen: &mut Pen<'_>, (x, y, width): (u16, u16, u16), at: f64,
 }
 
 /// A bar from the middle to `push`, −1 to 1.
-pub(super) fn push(pen: &mut Pen<'_>, (x, y, half): (u16, u16, u16), push: f64) {
+pub(in crate::tui) fn push(pen: &mut Pen<'_>, (x, y, half): (u16, u16, u16), push: f64) {
     let signs = Signs::of(pen.look.glyphs);
     let push = if push.is_finite() { push.clamp(-1.0, 1.0) } else { 0.0 };
     let filled = place((push.abs() * f64::from(half)).round());
@@ -233,7 +233,7 @@ pub(super) fn window(count: usize, rows: usize, time_s: f64) -> std::ops::Range<
 }
 
 /// `text` cut to what fits between `x` and column `end`.
-pub(super) fn note(pen: &mut Pen<'_>, x: u16, y: u16, end: u16, text: &str, role: Role) {
+pub(in crate::tui) fn note(pen: &mut Pen<'_>, x: u16, y: u16, end: u16, text: &str, role: Role) {
     pen.text(x, y, &cut(text, usize::from(end.saturating_sub(x))), role);
 }
 

@@ -1,6 +1,6 @@
 //! Asking for the name of a profile.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use tui_input::Input;
 
@@ -33,13 +33,21 @@ impl Setup {
     /// # Errors
     /// What is wrong with the name.
     pub(super) fn file_for(&self, name: &str) -> Result<PathBuf, String> {
-        let name = name.trim();
-        let name = name.strip_suffix(".ron").unwrap_or(name);
-        let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        if (1..=64).contains(&name.len()) && name.chars().all(is_plain) {
-            Ok(self.profiles.join(format!("{name}.ron")))
-        } else {
-            Err("a profile's name has 1 to 64 letters (a-z, A-Z), digits, '-' and '_'".to_owned())
-        }
+        file_in(&self.profiles, name)
+    }
+}
+
+/// The file for a profile called `name` in the folder `profiles`.
+///
+/// # Errors
+/// What is wrong with the name.
+pub(in crate::tui) fn file_in(profiles: &Path, name: &str) -> Result<PathBuf, String> {
+    let name = name.trim();
+    let name = name.strip_suffix(".ron").unwrap_or(name);
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if (1..=64).contains(&name.len()) && name.chars().all(is_plain) {
+        Ok(profiles.join(format!("{name}.ron")))
+    } else {
+        Err("a profile's name has 1 to 64 letters (a-z, A-Z), digits, '-' and '_'".to_owned())
     }
 }

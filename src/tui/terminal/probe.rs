@@ -134,18 +134,17 @@ impl Tty {
         }
     }
 
-    /// Writes to standard output, where the pictures go, so that neither cuts the other; or to
-    /// the process's terminal, where that is none.
+    /// Writes to standard output, where the pictures go, so that neither cuts the other; where
+    /// that is a file or a pipe, to the process's terminal, for questions are no results.
     fn write(&self, bytes: &[u8]) -> io::Result<()> {
         match self {
-            Self::Own(file) if !rustix::termios::isatty(rustix::stdio::stdout()) => {
-                (&mut &*file).write_all(bytes)
-            }
-            _ => {
+            _ if rustix::termios::isatty(rustix::stdio::stdout()) => {
                 let mut out = io::stdout().lock();
                 out.write_all(bytes)?;
                 out.flush()
             }
+            Self::Own(file) => (&mut &*file).write_all(bytes),
+            Self::Input => File::options().write(true).open("/dev/tty")?.write_all(bytes),
         }
     }
 

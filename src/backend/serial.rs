@@ -1,0 +1,3 @@
+//! The plant at the end of a serial line.
+
+pub mod ports;
