@@ -1,6 +1,6 @@
 //! `coadapt devices` without a screen, as programs and pipes meet it.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking, helpers too")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking, helpers too")]
 
 use std::process::Output;
 

@@ -48,22 +48,22 @@ impl Desk {
     fn plug(&mut self, id: Id, name: &str) {
         let guid = "030000005e0400008e02000014010000".to_owned();
         let (name, mapping) = (name.to_owned(), "SDL mapping".to_owned());
-        self.hear(Event::Connected(About { id, name, guid, mapping }));
+        self.hear(&Event::Connected(About { id, name, guid, mapping }));
     }
 
-    fn hear(&mut self, event: Event) {
-        self.devices.hear(&event, Seconds(1.0));
+    fn hear(&mut self, event: &Event) {
+        self.devices.hear(event, Seconds(1.0));
     }
 
     fn axis(&mut self, axis: Axis, values: &[f64]) {
         for value in values {
-            self.hear(Event::Axis { pad: PAD, axis, value: *value });
+            self.hear(&Event::Axis { pad: PAD, axis, value: *value });
         }
     }
 
     fn button(&mut self, button: Button) {
         for is_pressed in [true, false] {
-            self.hear(Event::Button { pad: PAD, button, is_pressed });
+            self.hear(&Event::Button { pad: PAD, button, is_pressed });
         }
     }
 
@@ -126,7 +126,7 @@ fn with_pads() -> Desk {
     desk.axis(Axis::LeftStickX, &[0.05, 0.4, 0.62]);
     desk.axis(Axis::LeftStickY, &[-0.1]);
     desk.axis(Axis::RightZ, &[-1.0]);
-    desk.hear(Event::Button { pad: PAD, button: Button::Select, is_pressed: true });
+    desk.hear(&Event::Button { pad: PAD, button: Button::Select, is_pressed: true });
     desk
 }
 
@@ -318,8 +318,8 @@ fn learning_is_left_with_m_and_ends_when_the_pad_goes() {
     assert!(!desk.picture(80, 24).contains("1 of 5"));
     desk.keys("m");
     assert_eq!(desk.key(KeyCode::Char('q')), Reaction::Stay);
-    desk.hear(Event::Disconnected(Id(1)));
-    desk.hear(Event::Disconnected(PAD));
+    desk.hear(&Event::Disconnected(Id(1)));
+    desk.hear(&Event::Disconnected(PAD));
     desk.shows("the pad is gone");
     assert_eq!(desk.key(KeyCode::Char('q')), Reaction::Quit);
 }

@@ -1,5 +1,7 @@
 //! The picture of the devices screen.
 
+use std::iter::once;
+
 use ratatui::Frame;
 
 use super::{Devices, Gamepad, Page, Prompt, curve};
@@ -131,16 +133,30 @@ impl View<'_> {
         left - 2
     }
 
+    /// Why no pad is heard, and the pads that the system has.
+    fn no_gamepad(&self, pen: &mut Pen<'_>) {
+        let why = self.devices.no_pads.as_deref();
+        let why = why.unwrap_or("no gamepad is heard: plug one in");
+        let nodes = &self.devices.survey.gamepad_nodes;
+        let nodes = nodes
+            .iter()
+            .map(|node| format!("{}  {}, rights {}", node.name, node.path, node.rights.words()));
+        let mut y = 0;
+        for (words, role) in
+            once((why.to_owned(), Role::Strong)).chain(nodes.map(|n| (n, Role::Text)))
+        {
+            for line in wrapped(&words, usize::from(pen.width())) {
+                pen.text(0, y, &line, role);
+                y += 1;
+            }
+        }
+    }
+
     fn gamepad(&self, pen: &mut Pen<'_>) {
         let pads = self.devices.gamepads();
         let Some(pad) = pads.iter().find(|pad| pad.steers).or_else(|| pads.first()) else {
-            let why = self.devices.no_pads.as_deref();
-            let why = why.unwrap_or("no gamepad is heard: plug one in");
-            pen.text(0, 0, why, Role::Strong);
-            for (node, y) in self.devices.survey.gamepad_nodes.iter().zip(1..) {
-                let words = format!("{}  {}, rights {}", node.name, node.path, node.rights.words());
-                pen.text(0, y, &words, Role::Text);
-            }
+            let left = self.curve(pen, Device::Gamepad, None);
+            self.no_gamepad(&mut pen.part(0, 0, left, pen.height()));
             return;
         };
         let raw = pad.steers.then_some(pad.steering.raw);
