@@ -206,8 +206,8 @@ pub struct Simulate {
 
 const RELAY_EXAMPLES: &str = "\
 The pad is at this computer, the session at LAB-PC:
-  LAB-PC:  coadapt run balance --operator gamepad:relay=unix:/tmp/pad
-  here:    coadapt pad-relay | ssh LAB-PC coadapt pad-relay --forward unix:/tmp/pad
+  LAB-PC:  coadapt run balance --operator gamepad:relay=unix:$HOME/pad
+  here:    coadapt pad-relay | ssh LAB-PC 'coadapt pad-relay --forward unix:$HOME/pad'
 The session is here, the pad at LAPTOP:
   ssh LAPTOP coadapt pad-relay | coadapt run balance --operator gamepad:relay=-";
 
@@ -215,6 +215,12 @@ The session is here, the pad at LAPTOP:
 #[derive(Args, Debug)]
 #[command(after_help = RELAY_EXAMPLES)]
 pub struct PadRelay {
+    /// The profile whose `operator.gamepad.sdl_mappings` are used.
+    #[arg(default_value = "balance")]
+    pub profile: String,
+    /// Change a value of the profile.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
     /// Pass a relay's lines on from standard input to the session at this socket.
     #[arg(long, value_name = "unix:PATH")]
     pub forward: Option<String>,

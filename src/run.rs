@@ -95,7 +95,9 @@ fn headless(run: &crate::cli::Run) -> Result<ExitCode, RunError> {
     } else {
         say(&sentences(&finished).join("\n"))?;
     }
-    Ok(exit_code(&finished))
+    // Nobody was there to end it: something went wrong.
+    let is_cut = finished.results.status == crate::record::Status::Aborted;
+    Ok(if is_cut { ExitCode::from(1) } else { exit_code(&finished) })
 }
 
 /// What came out, for people.

@@ -128,18 +128,53 @@ fn a_stalled_link_is_nobodys_wish_until_lines_come_again() {
         assert!(Command::new("sh").args(["-c", &line]).status().unwrap().success());
     };
     signal("STOP");
-    terminal.shows("the relay is silent");
+    // Nobody steers at once; after a second the rollout waits.
     terminal.shows("away");
+    terminal.shows("PAUSED");
+    terminal.shows("the relay is silent");
     signal("CONT");
-    terminal.shows_that("no trouble", |screen| {
-        !screen.contains("silent") && screen.contains("+10.0 N")
-    });
+    // Its stick is still out.
+    terminal.shows("through its centre");
     end(&mut terminal);
     for end in &mut ends {
         let _ = end.kill();
         end.wait().unwrap();
     }
-    assert!(events(&terminal).contains("operator_absent"));
+    let told = events(&terminal);
+    assert!(told.contains("device_gone,the relay is silent"), "{told}");
+    assert!(told.contains("device_back,the relay is heard again"), "{told}");
+}
+
+#[test]
+fn a_tap_is_never_swallowed_and_a_second_relay_is_told_so() {
+    // Pressed and let go at the same time, before any line goes out.
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("events.csv");
+    let taps = "0,connect,0,Pad,\n0.5,press,0,east,\n0.5,release,0,east,\n";
+    fs::write(&table, format!("t,event,pad,what,value\n{taps}")).unwrap();
+    let output = coadapt().args(["pad-relay", "--events"]).arg(table).output().unwrap();
+    let lines = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(lines.matches("\"pressed\":[\"east\"]").count(), 1, "{lines}");
+
+    let mut terminal = Seat::default().open(&format!("{CALM} gamepad:relay=unix:pad"));
+    terminal.shows("no relay yet");
+    let quiet = "0,connect,0,First,\n0,axis,0,left_stick_x,0\n60,disconnect,0,,\n";
+    let mut first = relay(&terminal.at(""), quiet);
+    terminal.shows("gamepad First");
+    let loud = quiet.replace("First", "Second").replace("stick_x,0", "stick_x,1");
+    let [mut near, far] = relay(&terminal.at(""), &loud);
+    let told = far.wait_with_output().unwrap();
+    assert_eq!(told.status.code(), Some(1));
+    let words = String::from_utf8(told.stderr).unwrap();
+    assert!(words.contains("another relay steers this session already"), "{words}");
+    near.kill().unwrap();
+    near.wait().unwrap();
+    terminal.shows("gamepad First");
+    end(&mut terminal);
+    for end in &mut first {
+        let _ = end.kill();
+        end.wait().unwrap();
+    }
 }
 
 #[test]

@@ -63,6 +63,7 @@ fn info() -> Info {
         regions: None,
         field_cap: 100,
         operator: "keyboard, releases reported".to_owned(),
+        buttons: String::new(),
         device_state: String::new(),
         device: Some(Device::Keyboard),
         sensitivity: 1.0,
@@ -358,9 +359,9 @@ fn a_gamepad_that_is_gone_and_one_that_is_relayed() {
     both("gone_gamepad", &info, &snapshot, &ui);
     snapshot.stage = Stage::Instruction(Moment::start_of(Phase::Main));
     small("briefing_without_gamepad", &info, &snapshot, &ui);
-    // Nobody steers the robot's own rollouts: then it is no trouble.
+    // While the robot is alone its button is still the person's emergency stop.
     let shown = picture(80, 24, &info, &running(Phase::Autonomous), &ui).to_string();
-    assert!(!shown.contains("unplugged"), "{shown}");
+    assert!(shown.contains("unplugged"), "{shown}");
 }
 
 #[test]

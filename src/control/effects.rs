@@ -283,7 +283,7 @@ impl<W: Witness> Cycle<W> {
     /// Takes what happened to the operator's device since the last tick. Without it nobody
     /// can steer: a rollout that needs a person waits, before anything is applied.
     pub(super) fn listen(&mut self) {
-        let now = self.now();
+        let (now, mut was_gone) = (self.now(), false);
         while let Some(news) = self.crew.operator.news(now) {
             let (event, words) = match news {
                 News::Asks(request) => {
@@ -295,7 +295,10 @@ impl<W: Witness> Cycle<W> {
                     });
                     continue;
                 }
-                News::Gone(words) => ("device_gone", words),
+                News::Gone(words) => {
+                    was_gone = true;
+                    ("device_gone", words)
+                }
                 News::Back(words) => ("device_back", words),
                 News::Remark(words) => ("device", words),
             };
@@ -303,7 +306,8 @@ impl<W: Witness> Cycle<W> {
         }
         let is_steered = self.stage.moment().is_some_and(|moment| moment.phase.is_steered());
         let is_due = matches!(self.stage, Stage::Running(_) | Stage::Hold { .. });
-        if is_steered && is_due && self.crew.operator.is_gone() {
+        // One that came back within the tick was gone all the same.
+        if is_steered && is_due && (was_gone || self.crew.operator.is_gone()) {
             self.seen.human = Intent::Absent;
             self.happen(Event::Pause);
         }

@@ -45,8 +45,8 @@ impl Device {
     pub fn tell(&self, sidecar: &mut Sidecar) -> bool {
         let words = self.badge.words();
         let devices = &mut sidecar.devices;
-        let is_new = !words.is_empty() && !devices.contains(&words);
-        if is_new && devices.len() < MOST_DEVICES {
+        let is_new = !words.is_empty() && devices.len() < MOST_DEVICES && !devices.contains(&words);
+        if is_new {
             devices.push(words);
         }
         let known = self.hands.as_ref().map(|hands| hands.knowledge().words().to_owned());

@@ -32,6 +32,11 @@ impl Badge {
         self.signs().state = state.into();
     }
 
+    /// Says all at once.
+    pub fn update(&self, words: String, state: String, trouble: Option<String>) {
+        *self.signs() = Signs { words, state, trouble };
+    }
+
     /// Says what is wrong and what to do about it, or that all is well.
     pub fn set_trouble(&self, trouble: Option<String>) {
         self.signs().trouble = trouble;

@@ -6,6 +6,7 @@
 pub mod events;
 pub mod feel;
 pub mod hub;
+pub mod inbox;
 pub mod learn;
 pub mod link;
 mod map;
@@ -17,6 +18,8 @@ mod source;
 pub use map::{Axis, Button, Map};
 pub use pads::{About, Event, Id, Pad, Pads};
 pub use source::Source;
+
+use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
@@ -40,8 +43,10 @@ pub struct Params {
     pub sdl_mappings: Vec<String>,
     /// A pad that was plugged in steers once its deflection has been within this of rest.
     pub centre: f64,
-    /// A relayed pad that is silent for longer steers no more, s.
+    /// A relayed pad that is silent for longer steers no more, s;
     pub silent_s: f64,
+    /// for longer than this, and the rollout waits, as without a pad.
+    pub lost_s: f64,
     /// What the pad lets the hand feel.
     pub rumble: Rumble,
     /// From the steering axis to the action.
@@ -56,6 +61,7 @@ impl Default for Params {
             sdl_mappings: Vec::new(),
             centre: 0.15,
             silent_s: 0.2,
+            lost_s: 1.0,
             rumble: Rumble::default(),
             shape: Shape { dead_zone: 0.1, outer_zone: 0.02, ..Shape::default() },
         }
@@ -76,6 +82,7 @@ impl Check for Params {
         }
         c.range("centre", self.centre, 0.01..=0.9);
         c.range("silent_s", self.silent_s, 0.05..=5.0);
+        c.range("lost_s", self.lost_s, 0.05..=60.0);
         c.range("rumble.strength", self.rumble.strength, 0.0..=1.0);
         self.shape.check(&mut c.section("shape"));
     }
@@ -117,11 +124,17 @@ fn is_sdl_mapping(line: &str) -> bool {
 pub struct Gamepad {
     pads: Pads,
     source: Source,
-    /// A relayed pad that is silent for longer is nobody's wish.
+    /// A relayed pad that is silent for longer is nobody's wish,
     silent: Seconds,
+    /// and for longer than this it is lost.
+    lost_after: Seconds,
+    is_lost: bool,
     shaper: Shaper,
     touch: Touch,
     badge: Badge,
+    /// When events were taken last.
+    heard_at: Option<Seconds>,
+    news: VecDeque<News>,
 }
 
 impl Gamepad {
@@ -129,15 +142,19 @@ impl Gamepad {
     /// ± `limit`.
     #[must_use]
     pub fn new(source: Source, params: &Params, limit: f64, tick: Seconds) -> Self {
-        let mut gamepad = Self {
+        let gamepad = Self {
             pads: Pads::new(params),
             source,
             silent: Seconds(params.silent_s),
+            lost_after: Seconds(params.silent_s.max(params.lost_s)),
+            is_lost: false,
             shaper: Shaper::new(params.shape, limit, tick),
             touch: Touch::new(params.rumble),
             badge: Badge::default(),
+            heard_at: None,
+            news: VecDeque::new(),
         };
-        gamepad.hear(Seconds(0.0));
+        gamepad.tell(Seconds(0.0));
         gamepad
     }
 
@@ -147,16 +164,41 @@ impl Gamepad {
         self.badge.clone()
     }
 
-    /// Takes all events up to `now`, the session's time, and says what came of them.
+    /// Takes all events up to `now`, the session's time, once a tick.
     fn hear(&mut self, now: Seconds) {
-        self.source.drain(now, &mut self.pads);
-        self.badge.say(self.pads.words());
-        self.badge.set_state(self.source.words(now));
+        if self.heard_at.replace(now) == Some(now) {
+            return;
+        }
+        self.source.drain(now, self.silent, &mut self.pads);
+        self.news.extend(std::iter::from_fn(|| self.pads.next_news()));
+        self.news.extend(self.source.news());
+        self.notice_silence(now);
+        self.tell(now);
+    }
+
+    /// A relay that is silent for too long is lost; back, the stick passes its centre first.
+    fn notice_silence(&mut self, now: Seconds) {
+        let is_lost = self.source.age(now).is_some_and(|age| age > self.lost_after);
+        if is_lost != self.is_lost {
+            self.is_lost = is_lost;
+            self.news.push_back(if is_lost {
+                News::Gone("the relay is silent".to_owned())
+            } else {
+                News::Back("the relay is heard again".to_owned())
+            });
+        }
+        if is_lost {
+            self.pads.lose_grip();
+        }
+    }
+
+    /// Says what became of the device.
+    fn tell(&self, now: Seconds) {
         let silent = self.silence(now).map(|silence| {
             format!("the relay is silent for {:.1} s: its network is slow or down", silence.0)
         });
-        let trouble = self.source.trouble().or_else(|| self.pads.trouble()).or(silent);
-        self.badge.set_trouble(trouble);
+        let trouble = self.source.trouble().or(silent).or_else(|| self.pads.trouble());
+        self.badge.update(self.pads.words(), self.source.words(now), trouble);
     }
 
     /// For how long a relay has been silent, if that is too long.
@@ -184,11 +226,11 @@ impl Operator for Gamepad {
 
     fn news(&mut self, now: Seconds) -> Option<News> {
         self.hear(now);
-        self.pads.next_news().or_else(|| self.source.news())
+        self.news.pop_front()
     }
 
     fn is_gone(&self) -> bool {
-        self.pads.deflection().is_none()
+        self.is_lost || self.pads.deflection().is_none()
     }
 
     fn is_over(&self) -> bool {

@@ -191,8 +191,8 @@ impl Mouse {
         let shaped = self.shaper.shape(raw);
         let action = match self.params.steer {
             Steer::Velocity => shaped,
-            // A pointer that nobody saw yet draws nowhere.
-            Steer::Position if self.pointer.last_event().is_none() => 0.0,
+            // A pointer that nobody sees draws nowhere.
+            Steer::Position if self.pointer.place(self.params.along).is_none() => 0.0,
             Steer::Position => self.limit * self.params.pull(shaped, state),
         };
         (action, raw)

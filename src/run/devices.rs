@@ -8,7 +8,6 @@ use std::panic::{self, AssertUnwindSafe};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::PoisonError;
-use std::sync::mpsc::Receiver;
 
 use serde::Serialize;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -21,7 +20,8 @@ use crate::backend::serial::ports;
 use crate::cli;
 use crate::clock::{Clock, WallClock};
 use crate::host::{About, Host, Login, Problem};
-use crate::operator::gamepad::hub::{Heard, Hub, NoPads};
+use crate::operator::gamepad::hub::{Hub, NoPads};
+use crate::operator::gamepad::inbox::Inbox;
 use crate::operator::gamepad::rights::{self, Build};
 use crate::operator::gamepad::{Event, Pads};
 use crate::operator::terminal::Hands;
@@ -75,7 +75,7 @@ fn look_once(profile: &Profile, hub: &Result<Hub, NoPads>, mut clock: WallClock)
         let heard = hub.listen(clock.now());
         let settled = clock.now() + SETTLING;
         clock.wait_until(settled);
-        for (event, at) in heard.try_iter() {
+        while let Some((event, at)) = heard.next() {
             pads.take(event, at);
         }
     }
@@ -138,7 +138,7 @@ fn add_terminal(survey: &mut Survey, asked: Option<Abilities>) {
 /// The screen's view of the computer.
 struct Here {
     computer: Computer,
-    heard: Option<Receiver<Heard>>,
+    heard: Option<Inbox>,
     shutdown: Shutdown,
 }
 
@@ -150,7 +150,8 @@ impl Bench for Here {
     }
 
     fn events(&mut self) -> Vec<(Event, Seconds)> {
-        self.heard.iter().flat_map(Receiver::try_iter).collect()
+        let inbox = self.heard.as_ref();
+        std::iter::from_fn(|| inbox?.next()).collect()
     }
 
     fn is_told_to_end(&self) -> bool {

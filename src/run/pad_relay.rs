@@ -1,16 +1,17 @@
 //! `coadapt pad-relay`: a gamepad at this computer for a session at another.
 
 use std::collections::VecDeque;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::process::ExitCode;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
+use super::words::{document, read};
 use super::{RunError, tell};
 use crate::cli;
 use crate::clock::{Clock, WallClock};
 use crate::operator::gamepad::events::Events;
-use crate::operator::gamepad::hub::{Heard, Hub};
+use crate::operator::gamepad::hub::Hub;
+use crate::operator::gamepad::inbox::Inbox;
 use crate::operator::gamepad::relay::{HEARTBEAT, Outlet};
 use crate::operator::gamepad::{Event, Pads, Params};
 use crate::operator::socket_path;
@@ -30,8 +31,10 @@ pub(super) fn pad_relay(words: &cli::PadRelay) -> Result<ExitCode, RunError> {
         let events = Events::load(file).map_err(|e| RunError::Usage(e.to_string()))?;
         Feed::Table(events.into_queue())
     } else {
-        let hub = Hub::open(clock, &[]).map_err(|e| RunError::Failed(e.to_string()))?;
-        tell("relaying; Ctrl-C ends");
+        let profile = read(&document(&words.profile, &words.set)?)?;
+        let hub = Hub::open(clock, &profile.operator.gamepad.sdl_mappings)
+            .map_err(|e| RunError::Failed(e.to_string()))?;
+        tell("relaying; Ctrl-C ends; coadapt devices shows why a pad is not heard");
         Feed::Pads(hub.listen(clock.now()))
     };
     let run = draw_seed().map_err(|error| RunError::Failed(error.to_string()))?;
@@ -50,36 +53,35 @@ fn relay(mut feed: Feed, mut clock: WallClock, mut outlet: Outlet) -> Result<Exi
                     Event::Disconnected(_) => tell("a gamepad was unplugged"),
                     Event::Axis { .. } | Event::Button { .. } => {}
                 }
+                let may_wait = matches!(event, Event::Axis { .. });
                 let now = clock.now();
-                let patience =
-                    if matches!(event, Event::Axis { .. }) { BURST } else { Seconds(0.0) };
                 pads.take(event, now);
-                due = if due < now + patience { due } else { now + patience };
-            }
-            Next::Time => {
-                let now = clock.now();
-                let line = outlet.line(&pads, now);
-                match writeln!(out, "{line}").and_then(|()| out.flush()) {
-                    Ok(()) => {}
-                    Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
-                        return Ok(ExitCode::SUCCESS);
-                    }
-                    Err(error) => {
-                        return Err(RunError::Failed(format!(
-                            "cannot write to standard output: {error}"
-                        )));
-                    }
+                due = Seconds(due.0.min(now.0 + BURST.0));
+                if may_wait {
+                    continue;
                 }
-                due = now + HEARTBEAT;
             }
+            Next::Time => {}
             Next::Over => return Ok(ExitCode::SUCCESS),
+        }
+        // A button's line goes out before the next event is heard, or a tap would vanish.
+        let now = clock.now();
+        let line = outlet.line(&pads, now);
+        match writeln!(out, "{line}").and_then(|()| out.flush()) {
+            Ok(()) => due = now + HEARTBEAT,
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
+                return Ok(ExitCode::SUCCESS);
+            }
+            Err(error) => {
+                return Err(RunError::Failed(format!("cannot write to standard output: {error}")));
+            }
         }
     }
 }
 
 /// Where events come from.
 enum Feed {
-    Pads(Receiver<Heard>),
+    Pads(Inbox),
     Table(VecDeque<(Seconds, Event)>),
 }
 
@@ -95,11 +97,7 @@ impl Feed {
         match self {
             Self::Pads(heard) => {
                 let patience = Duration::from_secs_f64((due - clock.now()).0.max(0.0));
-                match heard.recv_timeout(patience) {
-                    Ok((event, _)) => Next::Event(event),
-                    Err(RecvTimeoutError::Timeout) => Next::Time,
-                    Err(RecvTimeoutError::Disconnected) => Next::Over,
-                }
+                heard.wait(patience).map_or(Next::Time, |(event, _)| Next::Event(event))
             }
             Self::Table(events) => {
                 let Some((at, _)) = events.front() else {
@@ -132,12 +130,18 @@ fn forward(socket: &str) -> Result<ExitCode, RunError> {
             path.display()
         ))
     })?;
-    match io::copy(&mut io::stdin().lock(), &mut stream) {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(RunError::Failed(format!("the relay's lines went no further: {error}")))
-        }
-        _ => Ok(ExitCode::SUCCESS),
-    }
+    let Err(error) = io::copy(&mut io::stdin().lock(), &mut stream) else {
+        return Ok(ExitCode::SUCCESS);
+    };
+    // Only a session that wants no more says something, and then hangs up.
+    let mut said = String::new();
+    let _ = stream.read_to_string(&mut said);
+    let why = match said.trim() {
+        "" if error.kind() == io::ErrorKind::BrokenPipe => return Ok(ExitCode::SUCCESS),
+        "" => error.to_string(),
+        said => said.to_owned(),
+    };
+    Err(RunError::Failed(format!("the relay's lines went no further: {why}")))
 }
 
 #[cfg(not(unix))]

@@ -324,6 +324,11 @@ fn info(session: &Session) -> Info {
         regions: scene::regions_of(&profile.experiment),
         field_cap: profile.learner.max_fields,
         operator: sidecar.operator.clone(),
+        buttons: if device == Some(Device::Gamepad) {
+            profile.operator.gamepad.map.sentence()
+        } else {
+            String::new()
+        },
         device_state: String::new(),
         device,
         sensitivity: device.map_or(1.0, |device| profile.operator.shape(device).sensitivity),

@@ -18,7 +18,7 @@ use crate::control::witness::Standing;
 use crate::learner::Model;
 use crate::operator::mouse::Pointer;
 use crate::operator::terminal::Hands;
-use crate::operator::{self, Choice};
+use crate::operator::{self, Choice, Via};
 use crate::profile::{Document, Order, Profile};
 use crate::random::draw_seed;
 use crate::record::sidecar::Host;
@@ -214,6 +214,13 @@ impl Session {
             .map_err(|report| RunError::Usage(report.to_string()))?;
         let choice: Choice =
             sidecar.operator.parse().map_err(|e: operator::UnknownOperator| usage(&e))?;
+        if let Choice::Gamepad(Via::Script(file)) = &choice {
+            return Err(RunError::Usage(format!(
+                "this session follows the table of events {}, whose times are those of an \
+                 unbroken session: run it anew",
+                file.display()
+            )));
+        }
         let hand = steer(&choice, &profile, sidecar.seed, company)?;
         let plan = Plan::new(&profile.session, profile.tick(), sidecar.seed, company.is_attended());
         let fresh = fresh_learner(&profile)?;

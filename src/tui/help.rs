@@ -8,8 +8,8 @@ use super::text::wrapped;
 /// The width of the page, its border included.
 const WIDTH: u16 = 72;
 
-/// Draws the keys of `screen` and `notes` over what is there.
-pub fn draw(pen: &mut Pen<'_>, screen: Screen, notes: &[String]) {
+/// Draws the keys of `screen`, for `hand`, and `notes` over what is there.
+pub fn draw(pen: &mut Pen<'_>, screen: Screen, hand: Hand, notes: &[String]) {
     let bindings: Vec<_> = keys::of(screen).collect();
     let width = WIDTH.min(pen.width());
     let lines: Vec<String> =
@@ -23,8 +23,9 @@ pub fn draw(pen: &mut Pen<'_>, screen: Screen, notes: &[String]) {
     let shown = bindings.iter().map(|b| columns(b.shown)).max().unwrap_or(0).max(6);
     let mut y = 0;
     for binding in bindings {
-        page.text(0, y, binding.shown, Role::Strong);
-        page.text(shown + 3, y, binding.help, Role::Text);
+        let (keys, what) = binding.words(hand);
+        page.text(0, y, keys, Role::Strong);
+        page.text(shown + 3, y, what, Role::Text);
         y += 1;
     }
     page.text(0, y, "Ctrl-C", Role::Strong);
@@ -55,7 +56,7 @@ mod tests {
 
     #[test]
     fn the_line_of_keys_fits_the_smallest_screen() {
-        let hands = [Hand::On(Device::Keyboard), Hand::On(Device::Gamepad), Hand::Nobody];
+        let hands = [Hand::On(Device::Gamepad), Hand::On(Device::Mouse), Hand::Nobody];
         for (screen, hand) in Screen::ALL.into_iter().flat_map(|s| hands.map(|hand| (s, hand))) {
             let length: u16 =
                 keys::hints(screen, hand).map(|(key, word)| columns(key) + columns(word) + 3).sum();

@@ -105,6 +105,18 @@ pub struct Binding {
     pub action: Option<Action>,
 }
 
+impl Binding {
+    /// The keys in words, and what they do: where something else than keys steers, that.
+    #[must_use]
+    pub const fn words(&self, hand: Hand) -> (&'static str, &'static str) {
+        match (self.screen, self.action, hand) {
+            (Screen::Live, None, Hand::On(Device::Gamepad)) => ("stick", "steer with the stick"),
+            (Screen::Live, None, Hand::On(Device::Mouse)) => ("mouse", "steer with the mouse"),
+            _ => (self.shown, self.help),
+        }
+    }
+}
+
 const fn bind(
     screen: Screen,
     keys: &'static [KeyCode],
@@ -253,12 +265,10 @@ pub fn hints(screen: Screen, hand: Hand) -> impl Iterator<Item = (&'static str, 
         Some(Action::Faster) => hand == Hand::Nobody,
         Some(_) => true,
     };
-    let shown = move |binding: &Binding| match (binding.action, hand) {
-        (None, Hand::On(Device::Gamepad)) => "stick",
-        (None, Hand::On(Device::Mouse)) => "mouse",
-        _ => binding.shown,
-    };
-    of(screen).filter(fits).filter(|b| !b.hint.is_empty()).map(move |b| (shown(b), b.hint))
+    of(screen)
+        .filter(fits)
+        .filter(|b| !b.hint.is_empty())
+        .map(move |binding| (binding.words(hand).0, binding.hint))
 }
 
 #[cfg(test)]

@@ -73,6 +73,8 @@ pub struct Info {
     pub field_cap: u32,
     /// The operator and how it is known, such as "keyboard, releases reported".
     pub operator: String,
+    /// What the device's buttons do, in a sentence; empty where it has none.
+    pub buttons: String,
     /// How the operator's device does at the moment, in a few words; mostly none.
     pub device_state: String,
     /// The device that the operator's hand is on; `None` where there is none.
@@ -243,9 +245,10 @@ impl View<'_> {
     ) {
         let room = usize::from(pen.width().saturating_sub(2));
         // A page or a box says what is wrong already, and its keys are wanted.
-        let has_box = matches!(self.panel.stage, Stage::Paused(_) | Stage::Instruction(_));
-        let is_due = self.phase().is_steered() && !has_box;
-        let trouble = self.ui.trouble.as_ref().filter(|_| is_due);
+        let steered = self.phase().is_steered();
+        let has_box =
+            steered && matches!(self.panel.stage, Stage::Paused(_) | Stage::Instruction(_));
+        let trouble = self.ui.trouble.as_ref().filter(|_| !has_box);
         match (self.ui.message.as_ref().or(trouble), self.ui.tuned) {
             (Some(message), _) => {
                 pen.text(1, y, &super::text::cut(message, room), Role::Alarm);
@@ -294,7 +297,7 @@ fn page(pen: &mut Pen<'_>, view: &View<'_>) {
     }
     if view.ui.help_open {
         let screen = if is_briefing { Screen::Briefing } else { Screen::Live };
-        help::draw(pen, screen, &notes(view.info));
+        help::draw(pen, screen, view.hand(), &notes(view.info));
     }
 }
 
@@ -361,6 +364,9 @@ fn notes(info: &Info) -> Vec<String> {
     }
     if !info.operator.is_empty() {
         notes.push(format!("Steered by {}.", info.operator));
+    }
+    if !info.buttons.is_empty() {
+        notes.push(info.buttons.clone());
     }
     notes
 }

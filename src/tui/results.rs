@@ -160,7 +160,7 @@ fn whole(pen: &mut Pen<'_>, info: &Info, state: &State) {
         None => help::hints(pen, last, Screen::Results, Hand::Absent),
     }
     if state.help_open {
-        help::draw(pen, Screen::Results, &[]);
+        help::draw(pen, Screen::Results, Hand::Absent, &[]);
     }
 }
 

@@ -13,7 +13,7 @@
 //! that tells pads apart; `what` the pad's name, the axis or the button; `value` an axis'
 //! deflection, −1 to 1. Lines that begin with `#` are passed over.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -104,6 +104,7 @@ impl Events {
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
+        let mut present = BTreeSet::new();
         let (mut events, mut faults, mut latest) = (VecDeque::new(), Faults::default(), 0.0);
         let headers = reader.headers().cloned().unwrap_or_default();
         if headers != vec!["t", "event", "pad", "what", "value"] {
@@ -115,7 +116,10 @@ impl Events {
             let read = record.map_err(|error| (line_of(&error), error.to_string())).and_then(|r| {
                 let line = r.position().map_or(0, csv::Position::line);
                 let row: Row = r.deserialize(Some(&headers)).map_err(|e| (line, words(&e)))?;
-                event(&row, latest).map(|event| (row.t, event)).map_err(|what| (line, what))
+                event(&row, latest)
+                    .and_then(|event| known(event, &mut present))
+                    .map(|event| (row.t, event))
+                    .map_err(|what| (line, what))
             });
             match read {
                 Ok((t, event)) => {
@@ -177,9 +181,27 @@ fn event(row: &Row, latest: f64) -> Result<Event, String> {
     }
 }
 
+/// An event of a pad that is there.
+fn known(event: Event, present: &mut BTreeSet<Id>) -> Result<Event, String> {
+    let (id, is_there) = match &event {
+        Event::Connected(about) => {
+            present.insert(about.id);
+            return Ok(event);
+        }
+        Event::Disconnected(id) => (*id, present.remove(id)),
+        Event::Axis { pad, .. } | Event::Button { pad, .. } => (*pad, present.contains(pad)),
+    };
+    if is_there { Ok(event) } else { Err(format!("pad {} is not connected then", id.0)) }
+}
+
 /// The axis or button of that name.
 fn named<T: for<'de> Deserialize<'de>>(name: &str) -> Result<T, String> {
-    ron::from_str(name).map_err(|error| error.code.to_string())
+    ron::from_str(name).map_err(|error| match error.code {
+        ron::Error::NoSuchEnumVariant { expected, found, .. } => {
+            format!("`{found}` is unknown; allowed are {}", expected.join(", "))
+        }
+        _ => format!("`{name}` is no name; give one such as left_stick_x, start or code(29)"),
+    })
 }
 
 #[cfg(test)]
@@ -210,7 +232,8 @@ mod tests {
     #[test]
     fn every_fault_is_told_with_its_line() {
         let text = "t,event,pad,what,value\n0.5,axis,1,left_stick,0.3\n0.4,axis,1,left_stick_x,\n\
-                    1.0,press,1,start,\n0.9,release,1,start,\n1.0,jump,1,,\nx,press,1,start,\n1,press\n";
+                    1.0,connect,1,A,\n0.9,release,1,start,\n1.0,jump,1,,\nx,press,1,start,\n1,press\n\
+                    2,press,3,start,\n";
         let told = Events::parse(text).unwrap_err().to_string();
         for (line, word) in [
             (2, "left_stick_x"),
@@ -219,6 +242,7 @@ mod tests {
             (6, "connect, disconnect"),
             (7, "0.5,axis,1"),
             (8, "2 fields"),
+            (9, "pad 3 is not connected"),
         ] {
             let found = told.lines().find(|told| told.contains(&format!("line {line}:")));
             assert!(found.is_some_and(|found| found.contains(word)), "{line} {word}: {told}");

@@ -1,9 +1,10 @@
 //! The pads at this computer: one thread hears them all, for as long as the program runs.
 
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::feel::Feel;
+use super::inbox::{Inbox, Outbox};
 use super::pads::{About, Event, Id};
 use crate::clock::WallClock;
 use crate::signal::Seconds;
@@ -19,11 +20,6 @@ pub enum NoPads {
     System(String),
 }
 
-/// An event and when it was heard.
-pub type Heard = (Event, Seconds);
-
-/// Events that wait for one listener: a second's worth of the busiest pad.
-const QUEUE: usize = 1024;
 /// Things to be felt that wait for the pads' thread.
 #[cfg_attr(not(feature = "gamepad"), expect(dead_code, reason = "nothing can be felt"))]
 const FEELS: usize = 16;
@@ -39,7 +35,7 @@ pub struct Hub {
 struct Listeners {
     /// The pads that are plugged in.
     present: Vec<About>,
-    queues: Vec<SyncSender<Heard>>,
+    outboxes: Vec<Outbox>,
     /// Nobody wants this thread any more: another with other mappings took its place.
     is_over: bool,
 }
@@ -66,15 +62,14 @@ impl Hub {
 
     /// From now on hears everything, beginning with the pads that are there.
     #[must_use]
-    pub fn listen(&self, now: Seconds) -> Receiver<Heard> {
-        let (sender, receiver) = sync_channel(QUEUE);
+    pub fn listen(&self, now: Seconds) -> Inbox {
+        let inbox = Inbox::default();
         let mut listeners = self.listeners();
         for about in &listeners.present {
-            // There is room for more pads than anybody can plug in.
-            let _ = sender.try_send((Event::Connected(about.clone()), now));
+            inbox.outbox().put(&Event::Connected(about.clone()), now);
         }
-        listeners.queues.push(sender);
-        receiver
+        listeners.outboxes.push(inbox.outbox());
+        inbox
     }
 
     /// Lets the hand at `pad` feel something. A pad that cannot shake stays still.
@@ -99,11 +94,7 @@ impl Listeners {
             Event::Disconnected(id) => self.present.retain(|known| known.id != *id),
             Event::Axis { .. } | Event::Button { .. } => {}
         }
-        // One that hears nothing for so long does not listen any more.
-        self.queues.retain(|queue| match queue.try_send((event.clone(), now)) {
-            Ok(()) | Err(TrySendError::Full(_)) => true,
-            Err(TrySendError::Disconnected(_)) => false,
-        });
+        self.outboxes.retain(|outbox| outbox.put(event, now));
     }
 }
 

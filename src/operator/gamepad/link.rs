@@ -6,7 +6,7 @@ use std::io::{self, BufRead, BufReader, ErrorKind, Read};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::pads::Event;
-use super::relay::{Counts, Inlet, LONGEST_LINE};
+use super::relay::{self, Counts, Inlet, LONGEST_LINE};
 use crate::clock::{Clock, WallClock};
 use crate::signal::Seconds;
 
@@ -17,10 +17,21 @@ const QUEUE: usize = 4096;
 #[derive(Clone, Debug, Default)]
 pub struct Link(Arc<Mutex<State>>);
 
+/// An event, when its line came, and how late that was.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Relayed {
+    /// What happened.
+    pub event: Event,
+    /// When its line came.
+    pub at: Seconds,
+    /// How old it was by then.
+    pub age: Seconds,
+}
+
 #[derive(Debug, Default)]
 struct State {
     inlet: Inlet,
-    events: VecDeque<(Event, Seconds)>,
+    events: VecDeque<Relayed>,
     /// Why no line comes; `None` while the link is up.
     down: Option<String>,
     is_over: bool,
@@ -42,13 +53,14 @@ impl Link {
         let reading = link.clone();
         std::thread::Builder::new().name("coadapt-relay".to_owned()).spawn(move || {
             reading.read(BufReader::new(io::stdin()), clock);
-            reading.end("the relay has ended: start coadapt pad-relay and this again");
+            let words = "the relay has ended: start coadapt pad-relay and this again";
+            reading.end(words, clock.now());
         })?;
         Ok(LINK.get_or_init(|| link).clone())
     }
 
     /// Hands over the events that came since the last call, oldest first.
-    pub fn drain(&self) -> VecDeque<(Event, Seconds)> {
+    pub fn drain(&self) -> VecDeque<Relayed> {
         std::mem::take(&mut self.state().events)
     }
 
@@ -73,19 +85,22 @@ impl Link {
                 "the relay speaks version {version}, newer than this program: use the same \
                  coadapt on both computers"
             )),
-            None => state.down.clone(),
+            None => state.down.clone().or_else(|| {
+                let beginning = state.inlet.strange()?;
+                Some(format!("this is no line of coadapt pad-relay: {beginning}"))
+            }),
         }
     }
 
     /// A new listener: it hears first of the pads that are there.
     fn join(&self, now: Seconds) {
         let mut state = self.state();
-        state.events = state.inlet.present().map(|about| (Event::Connected(about), now)).collect();
+        let present = state.inlet.present().map(Event::Connected);
+        state.events = present.map(|event| Relayed { event, at: now, age: Seconds(0.0) }).collect();
     }
 
     /// Reads lines until the reader ends or the link is not wanted any more.
     fn read(&self, mut reader: impl BufRead, clock: WallClock) {
-        self.state().down = None;
         let mut line = Vec::new();
         loop {
             let room = LONGEST_LINE.saturating_sub(line.len()).max(1);
@@ -113,16 +128,18 @@ impl Link {
     }
 
     fn take(&self, line: &[u8], now: Seconds) {
+        // The tick never waits for a long line to be understood.
+        let line = relay::understand(String::from_utf8_lossy(line).trim_end());
         let mut state = self.state();
-        let events = state.inlet.take(String::from_utf8_lossy(line).trim_end(), now);
+        state.down = None;
+        let events = state.inlet.take(line, now);
         state.push(events, now);
     }
 
     /// The link is down, for the reason and with the cure in `words`.
-    fn end(&self, words: &str) {
+    fn end(&self, words: &str, now: Seconds) {
         let mut state = self.state();
         let events = state.inlet.end();
-        let now = state.events.back().map_or(Seconds(0.0), |(_, at)| *at);
         state.push(events, now);
         state.down = Some(words.to_owned());
     }
@@ -134,7 +151,8 @@ impl Link {
 
 impl State {
     fn push(&mut self, events: Vec<Event>, now: Seconds) {
-        self.events.extend(events.into_iter().map(|event| (event, now)));
+        let age = self.inlet.age(now).unwrap_or(Seconds(0.0));
+        self.events.extend(events.into_iter().map(|event| Relayed { event, at: now, age }));
         let beyond = self.events.len().saturating_sub(QUEUE);
         self.events.drain(..beyond);
     }
@@ -151,15 +169,22 @@ pub use socket::{Socket, SocketError};
 #[cfg(unix)]
 mod socket {
     use std::fs::{self, Permissions};
-    use std::io::{self, BufReader, ErrorKind};
+    use std::io::{self, BufReader, ErrorKind, Write};
     use std::os::unix::fs::{FileTypeExt, PermissionsExt};
     use std::os::unix::net::{UnixListener, UnixStream};
     use std::path::{Path, PathBuf};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
     use std::time::Duration;
 
     use super::Link;
-    use crate::clock::WallClock;
+    use crate::clock::{Clock, WallClock};
+    use crate::signal::Seconds;
 
+    /// How long a second relay waits for the first to go.
+    const KNOCK: Seconds = Seconds(0.3);
+    /// What a second relay is told.
+    const TAKEN: &str = "another relay steers this session already: end that one first\n";
     /// How often a silent connection looks whether it is still wanted.
     const LOOK: Duration = Duration::from_millis(100);
 
@@ -198,14 +223,14 @@ mod socket {
         pub fn listen(path: &Path, clock: WallClock) -> Result<Self, SocketError> {
             let refused = |cause| SocketError::Refused { path: path.to_owned(), cause };
             make_room(path)?;
-            let listener = UnixListener::bind(path).map_err(refused)?;
-            fs::set_permissions(path, Permissions::from_mode(0o600)).map_err(refused)?;
+            let listener = bind(path).map_err(refused)?;
             let link = Link::default();
-            link.end(&format!(
+            let words = format!(
                 "no relay yet: on the pad's computer run  coadapt pad-relay | ssh LAB-PC coadapt \
                  pad-relay --forward unix:{}",
                 path.display()
-            ));
+            );
+            link.end(&words, clock.now());
             let accepting = link.clone();
             std::thread::Builder::new()
                 .name("coadapt-relay".to_owned())
@@ -244,16 +269,51 @@ mod socket {
         }
     }
 
+    /// A socket that was never anybody else's: it is made in a folder of this user, and then
+    /// moved to its place.
+    fn bind(path: &Path) -> io::Result<UnixListener> {
+        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let folder =
+            tempfile::Builder::new().prefix(".pad").tempdir_in(parent.unwrap_or(Path::new(".")))?;
+        let private = folder.path().join("s");
+        let listener = UnixListener::bind(&private)?;
+        fs::set_permissions(&private, Permissions::from_mode(0o600))?;
+        fs::rename(&private, path)?;
+        Ok(listener)
+    }
+
+    /// Takes relays, one at a time: of two hands at once nobody would know who steers.
     fn accept(listener: &UnixListener, link: &Link, clock: WallClock) {
+        let is_taken = Arc::new(AtomicBool::new(false));
         for stream in listener.incoming() {
             if link.state().is_over {
                 return;
             }
-            let Ok(stream) = stream else { continue };
-            // Without it a session's end would wait for the relay's next line.
-            let _ = stream.set_read_timeout(Some(LOOK));
-            link.read(BufReader::new(stream), clock);
-            link.end("the relay has ended: start coadapt pad-relay again");
+            let Ok(mut stream) = stream else { continue };
+            // Somebody who only knocks is gone in a moment.
+            let (mut waiting, since) = (clock, clock.now());
+            while is_taken.load(Ordering::SeqCst) && waiting.now() - since < KNOCK {
+                waiting.wait_until(waiting.now() + Seconds(0.005));
+            }
+            if is_taken.swap(true, Ordering::SeqCst) {
+                let _ = stream.write_all(TAKEN.as_bytes());
+                continue;
+            }
+            let (link, is_free) = (link.clone(), Arc::clone(&is_taken));
+            let read = move || {
+                // Without it a session's end would wait for the relay's next line.
+                let _ = stream.set_read_timeout(Some(LOOK));
+                let before = link.counts();
+                link.read(BufReader::new(stream), clock);
+                // Somebody who only knocked has not been a relay.
+                if link.counts() != before {
+                    link.end("the relay has ended: start coadapt pad-relay again", clock.now());
+                }
+                is_free.store(false, Ordering::SeqCst);
+            };
+            if std::thread::Builder::new().name("coadapt-relay".to_owned()).spawn(read).is_err() {
+                is_taken.store(false, Ordering::SeqCst);
+            }
         }
     }
 }
@@ -292,12 +352,15 @@ mod tests {
         let link = Link::default();
         link.read(&lines(1)[..], WallClock::start());
         let counts = Counts { taken: 2, lost: 0, stale: 0, damaged: 2 };
-        assert_eq!((link.counts(), link.trouble()), (counts, None));
-        let events: Vec<Event> = link.drain().into_iter().map(|(event, _)| event).collect();
+        assert_eq!(link.counts(), counts);
+        assert!(link.trouble().unwrap().contains("no line of coadapt pad-relay: {\"coadapt_pad"));
+        let events: Vec<Event> = link.drain().into_iter().map(|relayed| relayed.event).collect();
         assert!(matches!(events[..], [Event::Connected(_), Event::Axis { .. }]), "{events:?}");
-        link.end("over");
+        link.end("over", Seconds(9.0));
         assert_eq!(link.trouble(), Some("over".to_owned()));
-        assert_eq!(link.drain().pop_front().unwrap().0, Event::Disconnected(Id(0)));
+        let over =
+            Relayed { event: Event::Disconnected(Id(0)), at: Seconds(9.0), age: Seconds(0.0) };
+        assert_eq!(link.drain().pop_front(), Some(over));
     }
 
     #[test]

@@ -135,6 +135,24 @@ impl Map {
     }
 }
 
+impl Map {
+    /// What the buttons do, for people.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let does = [
+            (self.begin, "goes on"),
+            (self.pause, "pauses"),
+            (self.discard, "throws the rollout away"),
+            (self.stop, "is the emergency stop"),
+        ];
+        let parts: Vec<String> = does
+            .iter()
+            .filter_map(|(button, does)| button.map(|button| format!("{button} {does}")))
+            .collect();
+        if parts.is_empty() { String::new() } else { format!("On the pad {}.", parts.join(", ")) }
+    }
+}
+
 impl Check for Map {
     fn check(&self, c: &mut Checker<'_>) {
         let buttons = self.buttons();

@@ -10,6 +10,7 @@
 //! The first pad that fits steers. Others are named, and one of them takes over when its
 //! button `begin` is pressed. The emergency stop counts on every pad that fits.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use serde::{Deserialize, Serialize};
@@ -65,7 +66,9 @@ pub enum Event {
 }
 
 /// Axes and buttons of one pad that are kept; no pad has more, but a broken one may say so.
-const MOST_CONTROLS: usize = 64;
+pub(super) const MOST_CONTROLS: usize = 64;
+/// Comings, goings and remarks that a session is told of.
+const MOST_TOLD: u32 = 500;
 
 /// A pad that is plugged in.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,6 +108,8 @@ pub struct Pads {
     /// Whether a value that is no number was told already.
     told_nonsense: bool,
     news: VecDeque<News>,
+    /// Comings, goings and remarks told so far.
+    told: u32,
 }
 
 impl Pads {
@@ -122,6 +127,7 @@ impl Pads {
             gone: None,
             told_nonsense: false,
             news: VecDeque::new(),
+            told: 0,
         }
     }
 
@@ -142,6 +148,22 @@ impl Pads {
         (self.map, self.centre) = (params.map, params.centre);
         let held = self.steering().and_then(|pad| pad.axes.get(&self.map.steer).copied());
         self.grip = held.map_or(Grip::Idle, |value| self.grip_at(value));
+    }
+
+    /// Takes what happened long ago, and is heard only now. Where a stick is counts, but of
+    /// what buttons ask for only the emergency stop: the hand meant that moment.
+    pub fn take_late(&mut self, event: Event, now: Seconds) {
+        let before = self.news.len();
+        self.take(event, now);
+        let late = self.news.split_off(before);
+        let counts =
+            |news: &News| !matches!(news, News::Asks(request) if *request != Request::Stop);
+        self.news.extend(late.into_iter().filter(counts));
+    }
+
+    /// The hand is believed again once the stick was at its centre.
+    pub fn lose_grip(&mut self) {
+        self.grip = Grip::Off;
     }
 
     /// The pads that are plugged in, in the order in which they came.
@@ -184,11 +206,12 @@ impl Pads {
     pub fn words(&self) -> String {
         let Some(pad) = self.steering() else { return String::new() };
         let About { name, mapping, .. } = &pad.about;
+        let mapping = if mapping.is_empty() { String::new() } else { format!(", {mapping}") };
         let others = match self.present.len() {
             0 | 1 => String::new(),
             all => format!("; {} more", all - 1),
         };
-        format!("gamepad {name}, {}, {mapping}{others}", self.map.steer)
+        format!("gamepad {name}, {}{mapping}{others}", self.map.steer)
     }
 
     /// What keeps the person from steering, and what to do about it.
@@ -221,7 +244,8 @@ impl Pads {
             self.grip = if self.gone.is_some() { Grip::Off } else { Grip::Idle };
             self.steering = Some(id);
             self.last = None;
-            self.news.push_back(if self.gone.take().is_some() {
+            let was_gone = self.gone.take().is_some();
+            self.tell(if was_gone {
                 News::Back(format!("{name} is plugged in"))
             } else {
                 News::Remark(format!("{name} steers"))
@@ -230,7 +254,20 @@ impl Pads {
             let waits = if fits { "waits" } else { "is not the wanted one" };
             let remark =
                 format!("{name} is plugged in and {waits}; {} steers", steering.about.name);
-            self.news.push_back(News::Remark(remark));
+            self.tell(News::Remark(remark));
+        }
+    }
+
+    /// Tells of a coming or going, unless a loose plug has filled the files with them already.
+    fn tell(&mut self, news: News) {
+        self.told = self.told.saturating_add(1);
+        match self.told.cmp(&MOST_TOLD) {
+            Ordering::Less => self.news.push_back(news),
+            Ordering::Equal => {
+                let words = "pads come and go without end; this is told no more".to_owned();
+                self.news.push_back(News::Remark(words));
+            }
+            Ordering::Greater => {}
         }
     }
 
@@ -240,11 +277,10 @@ impl Pads {
         if self.steering == Some(id) {
             self.steering = None;
             self.grip = Grip::Off;
-            self.news.push_back(News::Gone(format!("{name} was unplugged")));
+            self.tell(News::Gone(format!("{name} was unplugged")));
             self.gone = Some(name);
         } else {
-            self.news
-                .push_back(News::Remark(format!("{name}, which did not steer, was unplugged")));
+            self.tell(News::Remark(format!("{name}, which did not steer, was unplugged")));
         }
     }
 
@@ -302,7 +338,7 @@ impl Pads {
         let held = self.steering().and_then(|pad| pad.axes.get(&self.map.steer).copied());
         self.grip = held.map_or(Grip::Idle, |value| self.grip_at(value));
         self.gone = None;
-        self.news.push_back(News::Back(format!("{} steers from now on", about.name)));
+        self.tell(News::Back(format!("{} steers from now on", about.name)));
     }
 
     fn grip_at(&self, value: f64) -> Grip {

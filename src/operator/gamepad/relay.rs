@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use super::map::{Axis, Button};
-use super::pads::{About, Event, Id, Pad, Pads};
+use super::pads::{About, Event, Id, MOST_CONTROLS, Pad, Pads};
 use crate::signal::Seconds;
 
 /// The version that this program writes and understands.
@@ -27,6 +27,14 @@ pub const HEARTBEAT: Seconds = Seconds(0.02);
 pub const LONGEST_LINE: usize = 64 << 10;
 /// How fast two computers' clocks may drift apart.
 const DRIFT: f64 = 1e-4;
+/// Lines that are all late by more than this, and equally so within [`STEADY`], for
+/// [`SETTLED`], are not late: a computer slept, and its clock with it.
+const SLEPT: f64 = 2.0;
+const STEADY: f64 = 0.05;
+const SETTLED: f64 = 1.0;
+/// More pads than anybody holds, and more lines than any link loses at once.
+const MOST_PADS: usize = 8;
+const LONGEST_GAP: u64 = 1_000_000;
 
 /// The version of a line, whatever else it holds.
 #[derive(Deserialize)]
@@ -106,43 +114,100 @@ pub struct Inlet {
     last: Option<(Seconds, f64)>,
     /// The relay's clock is this far behind ours, as the fastest line showed it.
     offset: f64,
+    /// Since when all lines are late, and by how much.
+    late: Option<(Seconds, f64)>,
     /// The version of a relay that is newer than this program.
     newer: Option<u32>,
+    /// The beginning of the last line that could not be read, until one can.
+    strange: Option<String>,
+}
+
+/// A line as it was understood.
+#[derive(Clone, Debug)]
+pub struct Understood(Result<Line, Strange>);
+
+#[derive(Clone, Debug)]
+enum Strange {
+    Newer(u32),
+    Damaged(String),
+}
+
+/// Understands a line; the [`Inlet`] makes something of it.
+#[must_use]
+pub fn understand(line: &str) -> Understood {
+    let read = serde_json::from_str::<Line>(line).ok().filter(|line| line.t.is_finite());
+    Understood(match read {
+        Some(read) if read.coadapt_pad <= VERSION => Ok(read),
+        Some(newer) => Err(Strange::Newer(newer.coadapt_pad)),
+        None => Err(match serde_json::from_str::<Version>(line) {
+            Ok(Version { coadapt_pad }) if coadapt_pad > VERSION => Strange::Newer(coadapt_pad),
+            _ => Strange::Damaged(line.chars().filter(|c| !c.is_control()).take(40).collect()),
+        }),
+    })
 }
 
 impl Inlet {
     /// Takes a line that came at `now`, and returns what happened since the one before.
-    pub fn take(&mut self, line: &str, now: Seconds) -> Vec<Event> {
-        let version = serde_json::from_str::<Version>(line).ok().map(|line| line.coadapt_pad);
-        if let Some(version) = version.filter(|version| *version > VERSION) {
-            self.newer = Some(version);
-            return Vec::new();
-        }
-        let Some(line) = serde_json::from_str::<Line>(line).ok().filter(|line| line.t.is_finite())
-        else {
-            self.counts.damaged += 1;
-            return Vec::new();
+    pub fn take(&mut self, line: Understood, now: Seconds) -> Vec<Event> {
+        let line = match line.0 {
+            Ok(line) => line,
+            Err(Strange::Newer(version)) => {
+                self.newer = Some(version);
+                return Vec::new();
+            }
+            Err(Strange::Damaged(beginning)) => {
+                self.counts.damaged += 1;
+                self.strange = Some(beginning);
+                return Vec::new();
+            }
         };
         let is_same_run = self.run == Some(line.run);
         if is_same_run && line.seq <= self.seq {
             self.counts.stale += 1;
             return Vec::new();
         }
-        if is_same_run {
-            self.counts.lost += line.seq - self.seq - 1;
+        let gap = if is_same_run { line.seq - self.seq - 1 } else { 0 };
+        if gap > LONGEST_GAP {
+            self.counts.damaged += 1;
+            return Vec::new();
         }
+        self.counts.lost += gap;
         let behind = now.0 - line.t;
         self.offset = match self.last.filter(|_| is_same_run) {
             // The fastest line so far tells the clocks' difference, unless they drift.
             Some((at, _)) => behind.min(self.offset + DRIFT * (now - at).0),
             None => behind,
         };
+        self.notice_sleep(behind, now);
         self.counts.taken += 1;
         self.newer = None;
+        self.strange = None;
         self.run = Some(line.run);
         self.seq = line.seq;
         self.last = Some((now, line.t));
         self.changes(line.pads)
+    }
+
+    /// Lines that are `behind` the relay's clock by much and equally may be late no more.
+    fn notice_sleep(&mut self, behind: f64, now: Seconds) {
+        let is_late = behind > self.offset + SLEPT;
+        self.late = match self.late.filter(|_| is_late) {
+            Some((since, level)) if (behind - level).abs() < STEADY => {
+                if (now - since).0 >= SETTLED {
+                    self.offset = behind;
+                    None
+                } else {
+                    Some((since, level))
+                }
+            }
+            _ => is_late.then_some((now, behind)),
+        };
+    }
+
+    /// The beginning of a line that could not be read, if the last one could not.
+    #[must_use]
+    pub fn strange(&self) -> Option<&str> {
+        self.strange.as_deref()
     }
 
     /// The link has ended: every pad is gone.
@@ -177,8 +242,9 @@ impl Inlet {
     }
 
     /// What leads from the known pads to those of a line.
-    fn changes(&mut self, relayed: Vec<Relayed>) -> Vec<Event> {
+    fn changes(&mut self, mut relayed: Vec<Relayed>) -> Vec<Event> {
         let mut events = Vec::new();
+        relayed.truncate(MOST_PADS);
         let is_there = |pad: &Pad| relayed.iter().any(|relayed| relayed.about == pad.about);
         for pad in self.pads.values().filter(|pad| !is_there(pad)) {
             events.push(Event::Disconnected(pad.about.id));
@@ -190,12 +256,16 @@ impl Inlet {
                 events.push(Event::Connected(about.clone()));
                 Pad { about, axes: BTreeMap::new(), pressed: BTreeSet::new() }
             });
-            for (axis, value) in axes {
+            for (axis, value) in axes.into_iter().take(MOST_CONTROLS) {
                 if known.axes.insert(axis, value) != Some(value) {
                     events.push(Event::Axis { pad: id, axis, value });
                 }
             }
-            let pressed: BTreeSet<Button> = pressed.into_iter().collect();
+            // A pad that invents axes begins anew.
+            if known.axes.len() > MOST_CONTROLS {
+                known.axes.clear();
+            }
+            let pressed: BTreeSet<Button> = pressed.into_iter().take(MOST_CONTROLS).collect();
             for button in known.pressed.symmetric_difference(&pressed) {
                 let is_pressed = pressed.contains(button);
                 events.push(Event::Button { pad: id, button: *button, is_pressed });

@@ -209,8 +209,8 @@ fn unheard(host: &Host, nodes: &[Node]) -> Option<Problem> {
             "no pad is plugged in at this computer, which you reach through SSH; one at the \
              computer in front of you is relayed from there",
             format!(
-                "coadapt run balance --operator gamepad:relay=unix:/tmp/pad    # here\n\
-                 coadapt pad-relay | ssh {} coadapt pad-relay --forward unix:/tmp/pad    # there",
+                "coadapt run balance --operator gamepad:relay=unix:$HOME/pad    # here\n\
+                 coadapt pad-relay | ssh {} 'coadapt pad-relay --forward unix:$HOME/pad'    # there",
                 host.text("/proc/sys/kernel/hostname").unwrap_or_else(|| "LAB-PC".to_owned())
             ),
         )),
@@ -320,7 +320,7 @@ mod tests {
         assert!(off.iter().all(|problem| !problem.what.contains("libudev")), "{off:?}");
         fake.file("proc/bus/input/devices", "");
         let remote = fake.problems_with(FULL, &[("SSH_CONNECTION", "1 2 3 4")]);
-        assert!(mend(remote).contains("\ncoadapt pad-relay | ssh LAB-PC coadapt"));
+        assert!(mend(remote).contains("\ncoadapt pad-relay | ssh LAB-PC 'coadapt"));
         assert_eq!(fake.problems(), []);
         fake.file("proc/bus/input/devices", &[MOUSE, PAD, STICK].join("\n"));
         fs::remove_dir_all(fake.0.path().join("run")).unwrap();

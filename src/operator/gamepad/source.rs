@@ -2,14 +2,14 @@
 
 use std::collections::VecDeque;
 use std::fmt;
-use std::sync::mpsc::Receiver;
 
 use super::events::Events;
 use super::feel::Feel;
-use super::hub::{Heard, Hub};
-use super::link::Link;
+use super::hub::Hub;
+use super::inbox::Inbox;
 #[cfg(unix)]
 use super::link::Socket;
+use super::link::{Link, Relayed};
 use super::pads::{Event, Id, Pads};
 use super::relay::Counts;
 use crate::clock::{Clock, WallClock};
@@ -24,22 +24,21 @@ pub struct Source {
     kind: Kind,
     /// What became of a relay's lines, as far as it was told.
     told: Counts,
+    /// The latest time of the session that this was asked at.
+    now: Seconds,
 }
 
 enum Kind {
     Here {
         hub: Hub,
-        heard: Receiver<Heard>,
+        heard: Inbox,
         clock: WallClock,
     },
     Relay {
         link: Link,
         clock: WallClock,
-    },
-    #[cfg(unix)]
-    Socket {
-        socket: Socket,
-        clock: WallClock,
+        /// What the link lives in, if that is not the whole program.
+        _socket: Option<Box<dyn Send>>,
     },
     Script(VecDeque<(Seconds, Event)>),
     Nothing(String),
@@ -50,8 +49,6 @@ impl fmt::Debug for Source {
         f.write_str(match &self.kind {
             Kind::Here { .. } => "Here",
             Kind::Relay { .. } => "Relay",
-            #[cfg(unix)]
-            Kind::Socket { .. } => "Socket",
             Kind::Script(_) => "Script",
             Kind::Nothing(_) => "Nothing",
         })
@@ -69,14 +66,15 @@ impl Source {
     /// A relay's lines, which are stamped with `clock`.
     #[must_use]
     pub fn relay(link: Link, clock: WallClock) -> Self {
-        Self::of(Kind::Relay { link, clock })
+        Self::of(Kind::Relay { link, clock, _socket: None })
     }
 
     /// The lines of a relay that connects to `socket`.
     #[cfg(unix)]
     #[must_use]
     pub fn socket(socket: Socket, clock: WallClock) -> Self {
-        Self::of(Kind::Socket { socket, clock })
+        let link = socket.link().clone();
+        Self::of(Kind::Relay { link, clock, _socket: Some(Box::new(socket)) })
     }
 
     /// A table of events, in the session's time.
@@ -92,30 +90,33 @@ impl Source {
     }
 
     fn of(kind: Kind) -> Self {
-        Self { kind, told: Counts::default() }
+        let mut source = Self { kind, told: Counts::default(), now: Seconds(0.0) };
+        // What an earlier session lost is not this one's.
+        source.told = source.link().map(Link::counts).unwrap_or_default();
+        source
     }
 
     /// The time that events are stamped with, at the session's time `now`.
     pub(super) fn now(&self, now: Seconds) -> Seconds {
         match &self.kind {
             Kind::Here { clock, .. } | Kind::Relay { clock, .. } => clock.now(),
-            #[cfg(unix)]
-            Kind::Socket { clock, .. } => clock.now(),
             Kind::Script(_) | Kind::Nothing(_) => now,
         }
     }
 
-    /// Lets `pads` take all events up to `now`.
-    pub(super) fn drain(&mut self, now: Seconds, pads: &mut Pads) {
-        if let Some(link) = self.link() {
-            for (event, at) in link.drain() {
-                pads.take(event, at);
-            }
-        }
+    /// Lets `pads` take all events up to `now`; relayed ones that are older than `old` are
+    /// late.
+    pub(super) fn drain(&mut self, now: Seconds, old: Seconds, pads: &mut Pads) {
+        self.now = now;
         match &mut self.kind {
             Kind::Here { heard, .. } => {
-                while let Ok((event, at)) = heard.try_recv() {
+                while let Some((event, at)) = heard.next() {
                     pads.take(event, at);
+                }
+            }
+            Kind::Relay { link, .. } => {
+                for Relayed { event, at, age } in link.drain() {
+                    if age > old { pads.take_late(event, at) } else { pads.take(event, at) }
                 }
             }
             Kind::Script(events) => {
@@ -123,7 +124,7 @@ impl Source {
                     pads.take(event, at);
                 }
             }
-            _ => {}
+            Kind::Nothing(_) => {}
         }
     }
 
@@ -150,19 +151,24 @@ impl Source {
     /// That lines of a relay were lost since this was told last.
     pub(super) fn news(&mut self) -> Option<News> {
         let counts = self.link()?.counts();
-        let (lost, damaged) = (counts.lost - self.told.lost, counts.damaged - self.told.damaged);
-        let is_due = counts.taken >= self.told.taken + TOLD_EVERY;
-        if !is_due || lost + damaged == 0 {
+        let new = |now: u64, told: u64| now.saturating_sub(told);
+        let (taken, lost, damaged) = (
+            new(counts.taken, self.told.taken),
+            new(counts.lost, self.told.lost),
+            new(counts.damaged, self.told.damaged),
+        );
+        let all = taken + lost + damaged;
+        if all < TOLD_EVERY || lost + damaged == 0 {
             return None;
         }
-        let all = counts.taken - self.told.taken + lost + damaged;
         self.told = counts;
         Some(News::Remark(format!("of {all} relayed lines {lost} were lost, {damaged} damaged")))
     }
 
-    /// Whether no event will ever come again.
+    /// Whether no event will come for longer than anybody waits.
     pub(super) fn is_over(&self) -> bool {
-        matches!(&self.kind, Kind::Script(events) if events.is_empty())
+        let is_far = |(at, _): &(Seconds, Event)| *at > self.now + LONGEST_WAIT;
+        matches!(&self.kind, Kind::Script(events) if events.front().is_none_or(is_far))
     }
 
     /// Lets the hand at `pad` feel something, where that is possible.
@@ -175,12 +181,12 @@ impl Source {
     fn link(&self) -> Option<&Link> {
         match &self.kind {
             Kind::Relay { link, .. } => Some(link),
-            #[cfg(unix)]
-            Kind::Socket { socket, .. } => Some(socket.link()),
             Kind::Here { .. } | Kind::Script(_) | Kind::Nothing(_) => None,
         }
     }
 }
 
+/// A table whose next event is later than this has nothing to say.
+const LONGEST_WAIT: Seconds = Seconds(3600.0);
 /// Losses are told once in so many lines, about every ten seconds.
 const TOLD_EVERY: u64 = 500;

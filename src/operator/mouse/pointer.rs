@@ -78,6 +78,8 @@ struct Track {
     grid: Option<Grid>,
     /// Where it is.
     now: Option<(Place, Seconds)>,
+    /// Nobody knows where it is since then.
+    is_out: bool,
     /// Where it was from when on, as far as it moved without a break; oldest first.
     way: VecDeque<(Place, Seconds)>,
 }
@@ -87,6 +89,7 @@ impl Track {
         let Some(grid) = self.grid else { return };
         let place = grid.place(column, row);
         self.now = Some((place, at));
+        self.is_out = false;
         let has_begun = self.way.len() > 1;
         match self.way.back_mut() {
             Some((last, since)) if has_begun && (at - *since).0 < GRAIN.0 => *last = place,
@@ -144,7 +147,9 @@ impl Pointer {
 
     /// It is out of sight: at rest, and wherever it turns up again, it did not move there.
     pub fn rests(&self) {
-        self.track().breaks_off();
+        let mut track = self.track();
+        track.breaks_off();
+        track.is_out = true;
     }
 
     /// The time of its last event, if there was one.
@@ -153,10 +158,11 @@ impl Pointer {
         self.track().now.map(|(_, at)| at)
     }
 
-    /// Where it is, −1 to 1; `None` before its first event.
+    /// Where it is, −1 to 1; `None` before its first event and while it is out of sight.
     #[must_use]
     pub fn place(&self, along: Along) -> Option<f64> {
-        self.track().now.map(|(place, _)| place.along(along))
+        let track = self.track();
+        track.now.filter(|_| !track.is_out).map(|(place, _)| place.along(along))
     }
 
     /// Its mean velocity in the `window` before `now`, screens per second; exactly 0 when it

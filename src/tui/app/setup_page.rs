@@ -10,7 +10,7 @@ use crate::clock::Clock;
 use crate::operator::Choice;
 use crate::profile::Order;
 use crate::tui::help;
-use crate::tui::keys::Screen as Keys;
+use crate::tui::keys::{Hand, Screen as Keys};
 use crate::tui::palette::Look;
 use crate::tui::pen::Pen;
 use crate::tui::setup::{self, Extras, Reaction, Setup, Shelf};
@@ -98,7 +98,7 @@ impl Trial {
 fn draw_help(frame: &mut ratatui::Frame<'_>, look: Look) {
     let area = frame.area();
     let mut pen = Pen::new(frame.buffer_mut(), area, look);
-    help::draw(&mut pen, Keys::Setup, &[]);
+    help::draw(&mut pen, Keys::Setup, Hand::Absent, &[]);
     look.finish(frame.buffer_mut());
 }
 

@@ -49,7 +49,7 @@ pub fn draw(frame: &mut Frame<'_>, devices: &Devices, extras: &Extras<'_>) {
         View { devices, extras }.draw(&mut pen);
     }
     if devices.help_open {
-        help::draw(&mut pen, Screen::Devices, &[]);
+        help::draw(&mut pen, Screen::Devices, Hand::Absent, &[]);
     }
     extras.look.finish(frame.buffer_mut());
 }
