@@ -57,7 +57,8 @@ fn learn_golden(params: &Params) -> Agent {
         let throttle = Throttle::ALL[whole(action)];
         let (state, next) = (State::new([x, v]), State::new([x2, v2]));
         let driven = plant.step(&state, Action(throttle.part()));
-        assert!(close(driven[0], x2) && close(driven[1], v2), "{row:?}");
+        // An ending row's position is beyond the flag; ours stops there.
+        assert!(close(driven[0], x2.min(0.5)) && close(driven[1], v2), "{row:?}");
         let next = (done == 0.0).then(|| agent.cell(&next));
         let cell = agent.cell(&state);
         agent.learn(cell, throttle, reward, next);
