@@ -7,8 +7,7 @@
 //! PYTHON=gym/bin/python taskset -c 0 cargo bench --bench q_learning
 //! ```
 //!
-//! Without Gymnasium its row is left out. Measured so on an AMD EPYC (2 cores shared with
-//! others): see `docs/TASKS.md`.
+//! Without Gymnasium its row is left out. `docs/TASKS.md` has what came out.
 
 #![expect(clippy::expect_used, reason = "a benchmark that cannot be set up says why and ends")]
 #![expect(clippy::print_stdout, reason = "a table is no matter of criterion's")]
