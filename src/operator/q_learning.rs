@@ -120,7 +120,7 @@ impl Agent {
             None => self.table.add(cell, throttle, change),
             Some(traces) => {
                 let is_on_policy = self.table.is_best(cell, throttle);
-                traces.visit(self.table.place(cell, throttle), is_on_policy);
+                traces.visit(Table::place(cell, throttle), is_on_policy);
                 for (place, part) in traces.iter() {
                     self.table.add_at(place, change * part);
                 }

@@ -137,7 +137,7 @@ impl Table {
     }
 
     /// The place of a value among all.
-    pub(super) const fn place(&self, cell: Cell, throttle: Throttle) -> usize {
+    pub(super) const fn place(cell: Cell, throttle: Throttle) -> usize {
         cell.0 * Throttle::ALL.len() + throttle as usize
     }
 

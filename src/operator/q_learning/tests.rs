@@ -180,9 +180,9 @@ fn traces_carry_the_flag_back_to_the_last_step_off_the_policy() {
     agent.learn(cells[1], Throttle::Ahead, 1.0, None);
     agent.begin(0);
     let next = |k: usize| cells.get(k + 1).copied();
-    for k in 0..cells.len() {
+    for (k, cell) in cells.into_iter().enumerate() {
         let reward = if k == 3 { 100.0 } else { 0.0 };
-        agent.learn(cells[k], Throttle::Back, reward, next(k));
+        agent.learn(cell, Throttle::Back, reward, next(k));
     }
     let beta = params.beta(0);
     let value = |k: usize| agent.value(cells[k], Throttle::Back);
