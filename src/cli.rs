@@ -71,7 +71,8 @@ pub struct Run {
     #[arg(long, value_name = "LEARNER")]
     pub learner: Option<String>,
     /// `keyboard`, `gamepad[:relay=-|:relay=unix:PATH|:script=FILE]`, `mouse`,
-    /// `script:FILE|SESSION`, `simulated:naive|average|expert[:TYPE]` or `none`.
+    /// `script:FILE|SESSION`, `simulated:naive|average|expert[:TYPE]`, `q_learning` (mountain car)
+    /// or `none`.
     #[arg(long, value_name = "OPERATOR", default_value = "keyboard")]
     pub operator: String,
     /// simulated.

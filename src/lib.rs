@@ -33,7 +33,7 @@
 //! | `sharing` | mixing, success, share, regions | |
 //! | `teaching` | what the learner is given | |
 //! | `session` | subjects, phases, rollouts, and their order | |
-//! | `operator` | who steers: hands, scripts, simulated people | `plant`, `clock`, `host` |
+//! | `operator` | who steers: hands, scripts, simulated people, an agent | `plant`, `clock`, `host` |
 //! | `task` | what a plant is used for | `plant`, `sharing` |
 //! | `backend` | the plant, real or simulated, within its limits | `plant`, `clock`, `host` |
 //! | `record` | the files of a session | `learner`, `session`, `clock`, `sharing` |

@@ -1,9 +1,10 @@
-//! Who steers: hands on a device, a script, a simulated operator, or nobody.
+//! Who steers: hands on a device, a script, a simulated operator, an agent that learns, or nobody.
 
 pub mod badge;
 mod choice;
 pub mod gamepad;
 pub mod mouse;
+pub mod q_learning;
 pub mod script;
 pub mod shaping;
 pub mod simulated;
@@ -117,6 +118,19 @@ pub trait Operator: Send {
     /// The rollout that just began goes on without a pause from one that ended with this
     /// [`memory`](Self::memory).
     fn go_on(&mut self, _memory: &[f64]) {}
+
+    /// What it has learned by steering, as numbers of its own, between rollouts; a session that
+    /// is taken up again needs it. Empty for one that does not learn, or learns elsewhere, as
+    /// people do.
+    fn learned(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// It knows what it had [`learned`](Self::learned) then, and nothing since; false, and
+    /// nothing changes, where these are no numbers of its own.
+    fn recall(&mut self, learned: &[f64]) -> bool {
+        learned.is_empty()
+    }
 
     /// What came of the tick.
     fn told(&mut self, _feedback: &Feedback<'_>) {}

@@ -26,6 +26,8 @@ pub enum Purpose {
     Assignment = 6,
     /// Resampling for intervals.
     Bootstrap = 7,
+    /// What a reinforcement learner tries within a rollout.
+    Exploration = 8,
 }
 
 /// The place of a rollout within a session.

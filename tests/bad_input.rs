@@ -174,6 +174,8 @@ fn unknown_words_are_told_what_is_known() {
     let desk = Desk::new();
     let run = "run balance --headless --seed 1";
     refuses(&desk, &format!("{run} --operator parrot"), &["parrot", "script:FILE"]);
+    let agent = ["q_learning", "does not know balance", "simulated:average"];
+    refuses(&desk, &format!("{run} --operator q_learning"), &agent);
     refuses(&desk, &format!("{run} --operator simulated:genius"), &["genius", "naive"]);
     refuses(&desk, &format!("{run} --operator simulated:naive:drunk"), &["drunk", "delayed"]);
     refuses(&desk, &format!("{RUN} --learner perceptron"), &["perceptron", "rfwr"]);

@@ -11,7 +11,7 @@ use coadapt::control::cycle::{Crew, Cycle, Outcome, Rules};
 use coadapt::control::snapshot::{Command, Watcher, channel};
 use coadapt::control::witness::{Happening, Standing, Witness};
 use coadapt::learner::{Learner, Model};
-use coadapt::operator::{Operator, Practice, View};
+use coadapt::operator::{Feedback, Operator, Practice, View};
 use coadapt::profile::{Document, Profile};
 use coadapt::random::Place;
 use coadapt::record::{EpisodeRow, StepRow};
@@ -99,9 +99,10 @@ impl Backend for Rest {
     fn go_on(&mut self, _place: Place) {}
 }
 
-/// Pushes to the right, and more so in a repeated rollout.
+/// Pushes to the right, and more so in a repeated rollout; learns how often it was told of it.
 struct Pusher {
     push: f64,
+    told: f64,
     diary: Diary,
 }
 
@@ -119,6 +120,20 @@ impl Operator for Pusher {
 
     fn tune(&mut self, sensitivity: f64) {
         self.push = PUSH * sensitivity;
+    }
+
+    fn told(&mut self, _feedback: &Feedback<'_>) {
+        self.told += 1.0;
+    }
+
+    fn learned(&self) -> Vec<f64> {
+        vec![self.told]
+    }
+
+    fn recall(&mut self, learned: &[f64]) -> bool {
+        let &[told] = learned else { return false };
+        self.told = told;
+        true
     }
 }
 
@@ -220,7 +235,7 @@ impl Session {
         let crew = Crew {
             task: profile.experiment.task(tick),
             backend: Safe::new(Box::new(plant), limits),
-            operator: Box::new(Pusher { push: PUSH, diary: diary.clone() }),
+            operator: Box::new(Pusher { push: PUSH, told: 0.0, diary: diary.clone() }),
             witness: Notary {
                 diary: diary.clone(),
                 policies: Vec::new(),
@@ -312,6 +327,33 @@ fn practice_counts_what_was_steered_but_not_what_was_discarded() {
     assert_eq!(begun(&diary.take()), [(0, 0.0), (1, 6.0), (1, 6.0)]);
     session.finish();
     assert_eq!(begun(&diary.take())[..3], [(2, 12.0), (3, 18.0), (4, 24.0)]);
+}
+
+/// What the operator had learned by the beginning of each rollout.
+fn learned(standings: &[Standing]) -> Vec<f64> {
+    standings.iter().flat_map(|standing| standing.operator.clone()).collect()
+}
+
+#[test]
+fn what_an_operator_learned_in_a_discarded_rollout_is_forgotten() {
+    let mut session = Session::new(&profile("main"), true, None);
+    session.ask(Command::Begin);
+    session.tick(TICKS + 2);
+    session.ask(Command::Discard);
+    let standings = session.finish().witness.standings;
+    assert_eq!(learned(&standings)[..4], [0.0, 6.0, 6.0, 12.0]);
+}
+
+#[test]
+fn an_operator_knows_in_a_resumed_session_what_it_had_learned() {
+    let profile = profile("introduction, main");
+    let outcome = Session::new(&profile, false, None).finish();
+    let whole = learned(&outcome.witness.standings);
+    assert_eq!(whole[..4], [0.0, 6.0, 12.0, 18.0], "also in practice");
+    let standing = outcome.witness.standings[4].clone();
+    let earlier = outcome.episodes[..4].to_vec();
+    let resumed = Session::at_speed(0.0, &profile, false, None, Some((standing, earlier)));
+    assert_eq!(learned(&resumed.finish().witness.standings), whole[5..]);
 }
 
 #[test]

@@ -187,6 +187,32 @@ fn shares_that_move_each_episode_survive_a_kill() {
 }
 
 #[test]
+fn what_the_agent_learned_survives_a_kill() {
+    goes_on_like_unbroken(
+        "mountain-car",
+        "--operator q_learning --rollouts 60 --set simulated.q_learning.lambda=Some(0.9)",
+    );
+}
+
+#[test]
+fn a_damaged_table_of_the_agent_is_refused() {
+    let desk = Desk::new();
+    let line = "run mountain-car --headless --operator q_learning --seed 5 --rollouts 2000";
+    let folder = desk.at("logs/anon/001-mountain-car-simultaneous");
+    Running::start(&desk, line).once_in(&folder.join("steps.csv"), 1_000_000).killed();
+    let file = folder.join("checkpoint.json");
+    let mut checkpoint: Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
+    let table = checkpoint["operator"].as_array_mut().unwrap();
+    assert!(table.len() > 100);
+    table[0] = 0.5.into();
+    fs::write(&file, checkpoint.to_string()).unwrap();
+    let resume = "run --headless --resume logs/anon/001-mountain-car-simultaneous";
+    let refused = desk.run(resume);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("q_learning had learned"), "{}", text(&refused.stderr));
+}
+
+#[test]
 fn a_session_killed_at_its_beginning_goes_on() {
     let desk = Desk::new();
     Running::start(&desk, LONG).once("checkpoint.json", 1, &desk).killed();

@@ -349,6 +349,22 @@ fn a_task_brings_its_plain_profile_and_keeps_who_and_how() {
 }
 
 #[test]
+fn the_agent_is_offered_where_it_knows_the_task() {
+    let mut desk = Desk::nowhere();
+    desk.go(Field::Task).right(3).go(Field::Operator).right(4);
+    assert!(desk.shows("‹ q_learning ›") && desk.shows("an agent that learns to drive"));
+    assert!(desk.setup.order().command_line().contains("--operator q_learning"));
+    desk.go(Field::Task).right(1);
+    assert!(desk.shows("does not know balance"));
+    desk.go(Field::Operator).right(1);
+    assert!(!desk.shows("does not know balance"));
+    for _ in 0..6 {
+        assert!(!desk.shows("‹ q_learning ›"));
+        desk.right(1);
+    }
+}
+
+#[test]
 fn a_phase_ends_after_rollouts_or_after_a_time() {
     let mut desk = Desk::nowhere();
     desk.go(Field::Task).right(1);

@@ -6,7 +6,7 @@
 use hdrhistogram::Histogram;
 
 use super::effects;
-use super::rollout::{Mind, Rollout, WentOn};
+use super::rollout::{Before, Mind, Rollout, WentOn};
 use super::snapshot::{Command, MOST_REGIONS, Publisher, Snapshot};
 use super::witness::{Standing, Witness};
 use crate::backend::safety::Safe;
@@ -87,7 +87,7 @@ pub struct Cycle<W> {
     pub(super) crew: Crew<W>,
     pub(super) stage: Stage,
     pub(super) mind: Mind,
-    pub(super) before_rollout: Option<Mind>,
+    pub(super) before_rollout: Option<Before>,
     pub(super) rollout: Rollout,
     pub(super) went_on: Option<WentOn>,
     pub(super) teacher: Teacher,
@@ -163,6 +163,7 @@ impl<W: Witness> Cycle<W> {
         self.mind.learned = standing.learned;
         self.mind.refused = standing.refused;
         self.practice = standing.practice;
+        self.crew.operator.recall(&standing.operator);
         let Moment { phase, rollout, .. } = standing.moment;
         self.went_on = standing.momentum.map(|momentum| WentOn { phase, rollout, momentum });
         self.mind.tenths = standing.tenths;

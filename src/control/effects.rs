@@ -1,7 +1,7 @@
 //! What the cycle does about a transition of the session.
 
 use super::cycle::{Cycle, occasion};
-use super::rollout::{Mind, Rollout, WentOn};
+use super::rollout::{Before, Mind, Rollout, WentOn};
 use super::scale;
 use super::witness::{Happening, Standing, Witness};
 use crate::backend::Backend;
@@ -54,8 +54,9 @@ impl<W: Witness> Cycle<W> {
                 Effect::Halt | Effect::Release(_) => {}
                 Effect::Close { moment, end } => self.close(moment, end),
                 Effect::Restore => {
-                    if let Some(mind) = self.before_rollout.take() {
-                        self.mind = mind;
+                    if let Some(before) = self.before_rollout.take() {
+                        self.mind = before.mind;
+                        self.crew.operator.recall(&before.operator);
                     }
                 }
                 Effect::Leave(phase) => self.leave(phase),
@@ -147,7 +148,8 @@ impl<W: Witness> Cycle<W> {
                 self.crew.operator.go_on(&momentum.operator);
             }
             if self.rules.plan.attended {
-                self.before_rollout = Some(self.mind.clone());
+                let operator = self.crew.operator.learned();
+                self.before_rollout = Some(Before { mind: self.mind.clone(), operator });
             }
         }
     }
@@ -275,6 +277,7 @@ impl<W: Witness> Cycle<W> {
             learned: self.mind.learned,
             refused: self.mind.refused,
             practice: self.practice,
+            operator: if learns { self.crew.operator.learned() } else { Vec::new() },
             momentum: self.momentum_of(moment),
             tenths: self.mind.tenths,
         });

@@ -6,7 +6,7 @@ use crate::session::Phase;
 use crate::sharing::Sharing;
 use crate::task::{Nothing, Tally};
 
-/// The learner, the shares and their counts: what a discard restores.
+/// The learner, the shares and their counts.
 #[derive(Clone)]
 pub(super) struct Mind {
     pub(super) learner: Model,
@@ -15,6 +15,13 @@ pub(super) struct Mind {
     pub(super) refused: u64,
     /// Tenths of main whose policies are stored.
     pub(super) tenths: u8,
+}
+
+/// What was known before the rollout under way, which a discard restores.
+pub(super) struct Before {
+    pub(super) mind: Mind,
+    /// What the operator had learned.
+    pub(super) operator: Vec<f64>,
 }
 
 /// The rollout under way.

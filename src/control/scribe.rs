@@ -143,6 +143,7 @@ impl Witness for Scribe {
             learned,
             refused,
             practice: standing.practice,
+            operator: standing.operator,
             momentum: standing.momentum,
             tenths: standing.tenths,
             steps_bytes: 0,
@@ -196,6 +197,7 @@ pub fn standing_of(checkpoint: Checkpoint<Model>, frozen: Option<Model>) -> Opti
         learned: checkpoint.learned,
         refused: checkpoint.refused,
         practice: checkpoint.practice,
+        operator: checkpoint.operator,
         momentum: checkpoint.momentum,
         tenths: checkpoint.tenths,
     })

@@ -20,6 +20,8 @@ pub struct Standing {
     pub refused: u64,
     /// Rollouts that the operator has steered.
     pub practice: u32,
+    /// What the operator has learned, while it steers.
+    pub operator: Vec<f64>,
     /// What the rollout goes on with, if it does not begin at the task's start.
     pub momentum: Option<Momentum>,
     /// Tenths of main whose policies are stored.

@@ -84,6 +84,8 @@ pub enum Choice {
     Script(PathBuf),
     /// A model of a person.
     Simulated(Skill, Kind),
+    /// The agent that learns the mountain car.
+    QLearning,
     /// Nobody.
     None,
 }
@@ -109,7 +111,7 @@ impl Choice {
             Self::Keyboard => Some(Device::Keyboard),
             Self::Gamepad(_) => Some(Device::Gamepad),
             Self::Mouse => Some(Device::Mouse),
-            Self::Script(_) | Self::Simulated(..) | Self::None => None,
+            Self::Script(_) | Self::Simulated(..) | Self::QLearning | Self::None => None,
         }
     }
 }
@@ -119,7 +121,7 @@ impl Choice {
 pub enum UnknownOperator {
     /// No such operator.
     #[error(
-        "`{0}` is no operator; choose keyboard, gamepad (or gamepad:relay=-, gamepad:relay=unix:PATH, gamepad:script=FILE), mouse, script:FILE (a table, or a session's folder), simulated:SKILL[:TYPE] or none"
+        "`{0}` is no operator; choose keyboard, gamepad (or gamepad:relay=-, gamepad:relay=unix:PATH, gamepad:script=FILE), mouse, script:FILE (a table, or a session's folder), simulated:SKILL[:TYPE], q_learning (mountain car only) or none"
     )]
     Operator(String),
     /// No such skill or type.
@@ -136,6 +138,7 @@ impl FromStr for Choice {
             None if words == "none" => Ok(Self::None),
             None if words == "gamepad" => Ok(Self::Gamepad(Via::Here)),
             None if words == "mouse" => Ok(Self::Mouse),
+            None if words == "q_learning" => Ok(Self::QLearning),
             Some(("gamepad", via)) => match via.split_once('=') {
                 Some(("relay", "-")) => Ok(Self::Gamepad(Via::RelayInput)),
                 Some(("relay", socket)) => socket_path(socket)
@@ -181,6 +184,7 @@ impl fmt::Display for Choice {
                 write!(f, "simulated:{skill}")
             }
             Self::Simulated(skill, kind) => write!(f, "simulated:{skill}:{kind}"),
+            Self::QLearning => f.write_str("q_learning"),
             Self::None => f.write_str("none"),
         }
     }
@@ -216,6 +220,7 @@ mod tests {
             "gamepad:relay=unix:/run/pad=1",
             "gamepad:script=events.csv",
             "mouse",
+            "q_learning",
         ] {
             assert_eq!(words.parse::<Choice>().unwrap().to_string(), words);
         }
@@ -233,6 +238,7 @@ mod tests {
             "simulated",
             "",
             "mouse:1",
+            "q_learning:1",
         ] {
             let message = words.parse::<Choice>().unwrap_err().to_string();
             assert!(message.contains("script:FILE"), "{message}");

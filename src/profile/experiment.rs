@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 use super::layout::{Layout, Profile};
 use super::ron_options;
 use crate::check::{Check, Checker};
-use crate::operator::simulated;
+use crate::operator::{Choice, q_learning, simulated};
 use crate::plant::Plant;
 use crate::plant::ball_beam::{self, BallBeam};
 use crate::plant::cart_pole::{self, CartPole};
@@ -59,6 +59,16 @@ pub enum Experiment {
         /// Who steers where nobody is there.
         simulated: simulated::mountain_car::Params,
     },
+}
+
+/// An operator that does not know a task.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "q_learning learns the mountain car alone and does not know {task}: choose another operator, \
+     such as simulated:average, or a profile of the mountain car"
+)]
+pub struct Stranger {
+    task: &'static str,
 }
 
 /// Reads a profile's text for one task.
@@ -166,6 +176,31 @@ impl Experiment {
             }
             Self::SpeedUp { plant, .. } => Box::new(BallBeam::new(plant.clone(), tick)),
             Self::MountainCar { plant, .. } => Box::new(hill::MountainCar::new(plant.clone())),
+        }
+    }
+
+    /// The agent that learns this task in the person's place, knowing nothing yet.
+    ///
+    /// # Errors
+    /// When there is none for this task.
+    pub fn agent(&self, seed: u64) -> Result<q_learning::QLearner, Stranger> {
+        match self {
+            Self::MountainCar { plant, simulated, .. } => {
+                Ok(q_learning::QLearner::new(&simulated.q_learning, seed, plant))
+            }
+            _ => Err(Stranger { task: self.name() }),
+        }
+    }
+
+    /// That the operator of `choice` knows this task.
+    ///
+    /// # Errors
+    /// When it does not.
+    pub const fn knows(&self, choice: &Choice) -> Result<(), Stranger> {
+        match (choice, self) {
+            (Choice::QLearning, Self::MountainCar { .. }) => Ok(()),
+            (Choice::QLearning, _) => Err(Stranger { task: self.name() }),
+            _ => Ok(()),
         }
     }
 

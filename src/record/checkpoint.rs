@@ -36,6 +36,10 @@ pub struct Checkpoint<M> {
     pub refused: u64,
     /// Rollouts that the operator steered so far.
     pub practice: u32,
+    /// What the operator has learned by steering, as numbers of its own; empty for people, and
+    /// once nobody steers any more.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub operator: Vec<f64>,
     /// What the next rollout goes on with, if it does not begin at the task's start.
     #[serde(default)]
     pub momentum: Option<Momentum>,

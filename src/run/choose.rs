@@ -147,6 +147,7 @@ pub(super) fn steer(
             let operator = simulated_operator(&profile.experiment, (*skill, *kind), seed, tick);
             Hand { operator, device: None }
         }
+        Choice::QLearning => profile.experiment.agent(seed).map_err(|e| usage(&e))?.into(),
         Choice::Gamepad(via) => {
             let source = pad_source(via, &params.gamepad, company)?;
             let gamepad = Gamepad::new(source, &params.gamepad, limit, tick);

@@ -221,7 +221,7 @@ impl Session {
                 file.display()
             )));
         }
-        let hand = steer(&choice, &profile, sidecar.seed, company)?;
+        let mut hand = steer(&choice, &profile, sidecar.seed, company)?;
         let plan = Plan::new(&profile.session, profile.tick(), sidecar.seed, company.is_attended());
         let fresh = fresh_learner(&profile)?;
         let frozen = record::read_policy::<Model>(&path.join("policy.json")).ok();
@@ -243,6 +243,14 @@ impl Session {
                 path.display()
             )));
         };
+        // The cycle gives it back; that it can is known only here, where it can be refused.
+        if moment.phase.is_steered() && !hand.operator.recall(&standing.operator) {
+            return Err(RunError::Failed(format!(
+                "{}: what the operator {choice} had learned (checkpoint.json) is damaged: this \
+                 session cannot be resumed",
+                path.display()
+            )));
+        }
         let mut notice = format!(
             "resumed at {} {}; {} rows of the cut rollout were dropped",
             moment.phase, moment.rollout, resumed.dropped_steps

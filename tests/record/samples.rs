@@ -108,6 +108,7 @@ pub fn checkpoint(rollout: u32) -> Box<Checkpoint<Model>> {
         learned: 3,
         refused: 0,
         practice: rollout,
+        operator: Vec::new(),
         momentum: None,
         tenths: 0,
         steps_bytes: 0,

@@ -66,7 +66,11 @@ impl Drafts {
         match choice {
             Choice::Simulated(skill, kind) => drafts.model = (skill, kind),
             Choice::Script(file) => drafts.script = Input::new(file.display().to_string()),
-            Choice::Keyboard | Choice::Gamepad(_) | Choice::Mouse | Choice::None => {}
+            Choice::Keyboard
+            | Choice::Gamepad(_)
+            | Choice::Mouse
+            | Choice::QLearning
+            | Choice::None => {}
         }
         drafts.show_profile(profile);
         drafts
@@ -241,7 +245,7 @@ impl Setup {
                 self.change("learner.kind", next(&LEARNERS, &kind.as_str(), forward));
             }
             Field::Operator => {
-                let words = next(&OPERATORS, &self.operator_word(), forward);
+                let words = next(&self.operators(), &self.operator_word(), forward);
                 self.choose_operator(words);
             }
             Field::Skill => {
@@ -270,9 +274,17 @@ impl Setup {
         match self.operator() {
             Choice::Simulated(..) => "simulated",
             Choice::Script(_) => "script",
+            Choice::QLearning => Q_LEARNING,
             Choice::None => "none",
             hand => hand.device().unwrap_or(Device::Keyboard).word(),
         }
+    }
+
+    /// The operators that know the task.
+    fn operators(&self) -> Vec<&'static str> {
+        let experiment = &self.profile.experiment;
+        let has_agent = experiment.knows(&Choice::QLearning).is_ok();
+        OPERATORS.into_iter().filter(|word| has_agent || *word != Q_LEARNING).collect()
     }
 
     /// The device whose sensitivity is shown: the person's, or the keyboard in reserve.
@@ -352,8 +364,13 @@ impl Setup {
             );
             return Some((Field::Trial, message));
         }
-        if let Err(unknown) = self.order.operator.parse::<Choice>() {
-            return Some((Field::Script, unknown.to_string()));
+        match self.order.operator.parse::<Choice>() {
+            Ok(choice) => {
+                if let Err(stranger) = self.profile.experiment.knows(&choice) {
+                    return Some((Field::Operator, stranger.to_string()));
+                }
+            }
+            Err(unknown) => return Some((Field::Script, unknown.to_string())),
         }
         if let Err(report) = &self.reading {
             let first = report.faults().first()?;
@@ -422,7 +439,9 @@ const MODES: [WantedMode; 3] =
     [WantedMode::Simultaneous, WantedMode::Sequential, WantedMode::Assigned];
 /// The words of the learners, as profiles spell them.
 const LEARNERS: [&str; 2] = ["rfwr", "lwpr"];
-const OPERATORS: [&str; 6] = ["keyboard", "gamepad", "mouse", "simulated", "script", "none"];
+const OPERATORS: [&str; 7] =
+    ["keyboard", "gamepad", "mouse", "simulated", Q_LEARNING, "script", "none"];
+const Q_LEARNING: &str = "q_learning";
 
 /// The one of `all` after `current`, or before it, all around.
 pub(super) fn next<T: Clone + PartialEq>(all: &[T], current: &T, forward: bool) -> T {

@@ -244,6 +244,9 @@ impl View<'_> {
                     self.typed(pen, (ABOUT, 11, FORM - ABOUT), Field::Script);
                 }
             }
+            Choice::QLearning => {
+                note(pen, ABOUT, 11, FORM, "an agent that learns to drive", Role::Dim);
+            }
             Choice::None => note(pen, ABOUT, 11, FORM, "nobody steers: always 0", Role::Dim),
         }
     }

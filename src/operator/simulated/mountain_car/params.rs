@@ -1,8 +1,9 @@
-//! The numbers of those who drive the mountain car.
+//! The numbers of those who drive the mountain car where no hand is there.
 
 use serde::{Deserialize, Serialize};
 
 use crate::check::{Check, Checker};
+use crate::operator::q_learning;
 use crate::operator::simulated::{BySkill, growth, person};
 
 /// The drivers' parameters; velocities are the problem's own, a step's. All of the task's
@@ -24,6 +25,8 @@ pub struct Params {
     pub pauses_per_s: BySkill,
     /// For how long it is, s.
     pub pause_s: f64,
+    /// The agent that learns to drive, in the person's place.
+    pub q_learning: q_learning::Params,
 }
 
 impl Default for Params {
@@ -36,6 +39,7 @@ impl Default for Params {
             v_rest: (0.012, 0.002),
             pauses_per_s: (1.5, 0.2),
             pause_s: 0.3,
+            q_learning: q_learning::Params::default(),
         }
     }
 }
@@ -52,6 +56,7 @@ impl Check for Params {
             ("pauses_per_s", self.pauses_per_s, 0.0..=100.0),
         ];
         growth::check_pairs(c, pairs);
+        self.q_learning.check(&mut c.section("q_learning"));
     }
 }
 
