@@ -2,6 +2,7 @@
 
 pub mod safety;
 pub mod simulated;
+pub mod wire;
 
 use crate::random::Place;
 use crate::signal::{Action, Seconds, State};
