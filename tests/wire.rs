@@ -2,11 +2,15 @@
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking, helpers too")]
 
+use std::collections::{HashMap, HashSet};
+use std::fs;
 use std::path::Path;
 
+use coadapt::backend::wire::cobs1::frames as cobs1;
 use coadapt::backend::wire::sensorsini31::frames::{Reply, Request, raw_angles};
 use coadapt::backend::wire::{
-    Codec, Config, Firmware, FirmwareConfig, Message, Readings, Refusal, StateFrame, sensorsini31,
+    Ack, Codec, Config, Firmware, FirmwareConfig, Flags, Hello, Message, Outcome, Readings,
+    Refusal, StateFrame, sensorsini31,
 };
 use serde_json::Value;
 
@@ -212,4 +216,92 @@ fn streams_yield_their_frames_and_skip_the_rest() {
         }
     }
     assert_eq!(tried, 5);
+}
+
+/// The message that `words` of the document stand for, such as `CMD u=-3600`.
+fn cobs1_message(words: &str) -> Result<cobs1::Request, cobs1::Reply> {
+    let mut words = words.split(' ');
+    let name = words.next().unwrap();
+    let fields: HashMap<&str, &str> = words.map(|word| word.split_once('=').unwrap()).collect();
+    let field = |key: &str| -> i64 { fields[key].parse().unwrap() };
+    let narrow = |key: &str| -> u16 { field(key).try_into().unwrap() };
+    let byte = |key: &str| -> u8 { field(key).try_into().unwrap() };
+    let wide = |key: &str| -> i32 { field(key).try_into().unwrap() };
+    Ok(match name {
+        "QUERY" => cobs1::Request::Query,
+        "CONFIG" => cobs1::Request::Config { period_ms: narrow("period_ms") },
+        "STREAM" => cobs1::Request::Stream(field("on") == 1),
+        "HOME" => cobs1::Request::Home,
+        "ARM" => {
+            cobs1::Request::Arm { version: narrow("version"), watchdog_ms: narrow("watchdog_ms") }
+        }
+        "DISARM" => cobs1::Request::Disarm,
+        "CMD" => cobs1::Request::Command(wide("u")),
+        "STOP" => cobs1::Request::Stop,
+        "PING" => cobs1::Request::Ping,
+        "HELLO" => {
+            let hello = Hello {
+                sensors: byte("n"),
+                period_ms: narrow("period_ms"),
+                watchdog_ms: narrow("watchdog_ms"),
+                full_scale: wide("full_scale"),
+                name: Hello::named(fields["name"]),
+            };
+            return Err(cobs1::Reply::Hello { version: narrow("version"), hello });
+        }
+        "STATE" => {
+            let sensors: Vec<i32> =
+                fields["sensors"].split(',').map(|sensor| sensor.parse().unwrap()).collect();
+            return Err(cobs1::Reply::State(StateFrame {
+                sensors: Readings::new(&sensors).unwrap(),
+                time_us: field("t_us").try_into().unwrap(),
+                time_difference_us: None,
+                command: wide("u"),
+                applied: Some(byte("applied")),
+                flags: Some(Flags(narrow("flags"))),
+                firmware: None,
+            }));
+        }
+        "ACK" => {
+            let outcome = Outcome::ALL[usize::from(byte("result"))];
+            return Err(cobs1::Reply::Ack(Ack { of: byte("of"), outcome }));
+        }
+        "HOMED" => return Err(cobs1::Reply::Homed(field("direction").try_into().unwrap())),
+        _ => panic!("an unknown message {name}"),
+    })
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn the_frames_of_the_document_are_those_of_the_codec() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/SERIAL-PROTOCOL.md");
+    let document = fs::read_to_string(path).unwrap();
+    let rows = document.lines().skip_while(|line| *line != "| message | number | frame |");
+    let mut kinds = HashSet::new();
+    for row in rows.skip(2).take_while(|line| line.starts_with('|')) {
+        let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+        let &[words, number, shown] = &cells[..] else { panic!("{row}") };
+        let number: u8 = number.parse().unwrap();
+        let mut encoded = Vec::new();
+        let message = cobs1_message(words.trim_matches('`'));
+        match &message {
+            Ok(request) => request.encode(number, &mut encoded),
+            Err(reply) => reply.encode(number, &mut encoded),
+        }
+        assert_eq!(hex(&encoded), shown.trim_matches('`'), "{words}");
+        let mut deframer = cobs1::Deframer::default();
+        deframer.take(&from_hex(shown));
+        let Some(cobs1::Piece::Good(frame, _)) = deframer.piece() else { panic!("{words}") };
+        assert_eq!(frame.number(), number);
+        let decoded = match message {
+            Ok(_) => Ok(cobs1::Request::decode(&frame).unwrap()),
+            Err(_) => Err(cobs1::Reply::decode(&frame).unwrap()),
+        };
+        assert_eq!(decoded, message, "{words}");
+        kinds.insert(frame.kind());
+    }
+    assert_eq!(kinds.len(), 13, "the document shows {kinds:?}");
 }
