@@ -1,6 +1,8 @@
 //! The composition root: the one room that knows every other.
 
 mod choose;
+#[cfg(unix)]
+mod emulate;
 mod evaluate;
 mod fit;
 pub mod outcome;
@@ -68,6 +70,12 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Fit(words)) => fit::fit(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::PadRelay(words)) => pad_relay::pad_relay(words),
+        #[cfg(unix)]
+        Some(Command::Emulate(words)) => emulate::emulate(words),
+        #[cfg(not(unix))]
+        Some(Command::Emulate(_)) => {
+            Err(RunError::Usage("this system has no pseudo-terminals".to_owned()))
+        }
         Some(Command::Profile(profile)) => words::profile(profile),
     }
 }

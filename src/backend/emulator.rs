@@ -12,6 +12,8 @@ pub mod faults;
 pub mod homing;
 pub mod line;
 pub mod oracle;
+#[cfg(unix)]
+pub mod port;
 pub mod rig;
 pub mod trace;
 
@@ -154,7 +156,6 @@ impl Emulator {
             trace: Trace::default(),
             command: 0,
         };
-        emulator.to_host.send_garbage(emulator.garbage_at_connect, Seconds(0.0));
         emulator.start();
         emulator.board.set_clock(0, params.clock_us);
         emulator
@@ -185,6 +186,11 @@ impl Emulator {
             self.judge();
         }
         read
+    }
+
+    /// A host opens the port.
+    pub fn connect(&mut self) {
+        self.to_host.send_garbage(self.garbage_at_connect, self.now());
     }
 
     /// The time since the start.
@@ -313,7 +319,6 @@ impl Emulator {
         self.to_device.cut();
         self.announced.clear();
         self.unplugged_until = until;
-        self.to_host.send_garbage(self.garbage_at_connect, until);
     }
 }
 

@@ -24,7 +24,7 @@ pub struct Faults {
     pub to_host: Noise,
     /// On the way to the device.
     pub to_device: Noise,
-    /// So many bytes of rubbish come whenever the device is plugged in.
+    /// So many bytes of rubbish come whenever a host opens the port.
     pub garbage_at_connect: u32,
     /// `sensorsini31`: states of this length, such as 17 or 27; `cobs1`: this version.
     pub version: Option<u16>,

@@ -16,19 +16,24 @@ const DISTANCE: Seconds = Seconds(0.003);
 const HOMING_SHOWS: Seconds = Seconds(0.1);
 
 /// What a host must never do to the physical-cartpole firmware.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
 pub enum Offence {
     /// Two different commands without a state or an answer between them: the first may run
     /// with the second's payload.
+    #[error("two different commands without a state between them")]
     TwoCommands,
     /// More than [`MOST_OUTSTANDING`] bytes under way: they may overrun the buffer.
+    #[error("more than 24 bytes under way")]
     TooManyBytes,
     /// Bytes while the board is deaf.
+    #[error("bytes while the board homes or measures")]
     WhileDeaf,
     /// More than [`MOST_DUTY`].
+    #[error("more than 95 % duty")]
     Duty,
     /// The setting of the gains, which waits in the buffer and is never obeyed.
+    #[error("SET_PID_CONFIG, which no firmware obeys")]
     SetPid,
 }
 

@@ -81,6 +81,7 @@ fn an_unplugged_board_goes_on_unheard() {
     assert_eq!((lab.states().len(), lab.device.command()), (states, 500));
     lab.wait(0.3);
     assert!(lab.device.is_plugged() && lab.states().len() > states);
+    lab.device.connect();
     lab.order(Order::Stop, 0.1);
     assert_eq!(lab.device.command(), 0);
     assert!(lab.host.counts().skipped >= 40);
