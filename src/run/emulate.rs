@@ -27,6 +27,9 @@ const BUILT_IN: [(&str, &str); 2] = [
 ];
 /// Bytes are passed on at least this often.
 const TURN: Seconds = Seconds(0.001);
+/// When the machine was busy for longer than this, the device's time stood still: a burst of
+/// states from a past that no host saw would make it look as if the host were to blame.
+const STALL: Seconds = Seconds(0.01);
 
 /// Emulates until a signal comes, or the reader of the trace is gone.
 pub(super) fn emulate(words: &cli::Emulate) -> Result<ExitCode, RunError> {
@@ -42,6 +45,7 @@ pub(super) fn emulate(words: &cli::Emulate) -> Result<ExitCode, RunError> {
         link: words.port_link.clone(),
         is_open: false,
         clock: WallClock::start(),
+        behind: Seconds(0.0),
         notes: Notes { json: words.json, is_read: true },
     };
     while stand.notes.is_read {
@@ -62,6 +66,8 @@ struct Stand {
     /// Some program has the port open.
     is_open: bool,
     clock: WallClock,
+    /// How long the device's time has stood still altogether.
+    behind: Seconds,
     notes: Notes,
 }
 
@@ -69,14 +75,29 @@ impl Stand {
     fn turn(&mut self) -> Result<(), RunError> {
         self.plug()?;
         let written = self.hear().map_err(broken)?;
-        let read = self.device.advance(self.clock.now(), &written);
+        self.stand_still()?;
+        let read = self.device.advance(self.now(), &written);
         if let Some(port) = self.port.as_ref().filter(|_| self.is_open) {
             let lost = port.write(&read).map_err(broken)?;
             if lost > 0 {
-                self.notes.happens(self.clock.now(), &Happening::Unread { bytes: lost })?;
+                self.notes.happens(self.device.now(), &Happening::Unread { bytes: lost })?;
             }
         }
         self.notes.entries(&self.device.take_trace())
+    }
+
+    /// The device's time now.
+    fn now(&self) -> Seconds {
+        self.clock.now() - self.behind
+    }
+
+    fn stand_still(&mut self) -> Result<(), RunError> {
+        let stalled = self.now() - self.device.now();
+        if stalled <= STALL {
+            return Ok(());
+        }
+        self.behind = self.behind + stalled;
+        self.notes.happens(self.device.now(), &Happening::Stalled { for_s: stalled.0 })
     }
 
     /// Puts the cable in, under a new name, or pulls it.
@@ -87,12 +108,12 @@ impl Stand {
                     .map_err(|error| RunError::Failed(error.to_string()))?;
                 let happening = Happening::Port { path: port.name().to_owned() };
                 self.port = Some(port);
-                self.notes.happens(self.clock.now(), &happening)
+                self.notes.happens(self.device.now(), &happening)
             }
             (false, Some(_)) => {
                 self.port = None;
                 self.is_open = false;
-                self.notes.happens(self.clock.now(), &Happening::Gone)
+                self.notes.happens(self.device.now(), &Happening::Gone)
             }
             _ => Ok(()),
         }
@@ -143,6 +164,8 @@ enum Happening {
     Port { path: PathBuf },
     /// The cable is pulled.
     Gone,
+    /// The machine was busy, and the device's time stood still.
+    Stalled { for_s: f64 },
     /// The program does not read: bytes were lost.
     Unread { bytes: usize },
 }
@@ -169,6 +192,10 @@ impl Notes {
             Happening::Port { path } => self.line(&path.display().to_string()),
             Happening::Gone => {
                 tell("the cable is pulled");
+                Ok(())
+            }
+            Happening::Stalled { for_s } => {
+                tell(&format!("this computer was busy: the device stood still for {for_s:.3} s"));
                 Ok(())
             }
             Happening::Unread { bytes } => {

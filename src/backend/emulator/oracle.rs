@@ -10,8 +10,12 @@ use crate::signal::Seconds;
 pub const MOST_OUTSTANDING: usize = 24;
 /// The largest share of full duty.
 pub const MOST_DUTY: f64 = 0.95;
-/// Two different commands keep this distance while no states come.
+/// Two different commands keep this distance if the device says nothing between them: it is
+/// never busy for longer.
 const DISTANCE: Seconds = Seconds(0.003);
+/// So many commands a late host may have in store: one for the state that it answers late, and
+/// one for the next.
+const STORE: u32 = 2;
 /// A board that was asked to home and has not begun for so long never got the order.
 const HOMING_SHOWS: Seconds = Seconds(0.1);
 
@@ -19,8 +23,8 @@ const HOMING_SHOWS: Seconds = Seconds(0.1);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
 pub enum Offence {
-    /// Two different commands without a state or an answer between them: the first may run
-    /// with the second's payload.
+    /// More different commands than states, or two that are close without a state or an answer
+    /// between them: the first may run with the second's payload.
     #[error("two different commands without a state between them")]
     TwoCommands,
     /// More than [`MOST_OUTSTANDING`] bytes under way: they may overrun the buffer.
@@ -46,6 +50,8 @@ pub struct Oracle {
     last: Option<(Seconds, Written)>,
     /// The device has said something since.
     is_answered: bool,
+    /// States that no command has answered yet, at most [`STORE`].
+    unanswered: u32,
     stream: Stream,
     /// When the board was asked to do what makes it deaf.
     deaf: Option<Seconds>,
@@ -131,16 +137,22 @@ impl Oracle {
 
     /// Whether `order` may meet another one in the board's buffer. Copies of one frame are
     /// safe, and a stop is safe after any motor command.
-    fn is_too_soon(&self, order: Written, now: Seconds) -> bool {
+    fn is_too_soon(&mut self, order: Written, now: Seconds) -> bool {
         const STOP: Written = Written::Sensorsini31(Request::SetMotor(0));
-        let Some((at, last)) = self.last.filter(|_| !self.is_answered) else { return false };
+        let Some((at, last)) = self.last else { return false };
         let is_motor = matches!(last, Written::Sensorsini31(Request::SetMotor(_)));
-        let is_safe = order == last || (order == STOP && is_motor);
-        !is_safe && (self.stream == Stream::Running || now < at + DISTANCE)
+        if order == last || (order == STOP && is_motor) {
+            return false;
+        }
+        let is_close = !self.is_answered && now < at + DISTANCE;
+        let is_one_too_many = self.stream == Stream::Running && self.unanswered == 0;
+        self.unanswered = self.unanswered.saturating_sub(1);
+        is_close || is_one_too_many
     }
 
     fn delivered(&mut self, message: Kind) {
         self.is_answered = true;
+        self.unanswered = STORE.min(self.unanswered + 1);
         match message {
             Kind::State if self.stream == Stream::Stopped => {}
             Kind::State => self.stream = Stream::Running,

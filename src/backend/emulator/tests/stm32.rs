@@ -260,6 +260,13 @@ fn two_commands_in_a_period_are_named_and_one_after_each_state_is_not() {
     lab.order(Order::Command(1), 0.002);
     lab.order(Order::Command(2), 0.002);
     assert_eq!(lab.offences(), [Offence::TwoCommands]);
+    // A late host answers a state that it missed, and then the next; not three.
+    let mut lab = streaming();
+    lab.order(Order::Command(1), 0.052);
+    for (command, offences) in [(2, 0), (3, 0), (4, 1)] {
+        lab.order(Order::Command(command), 0.0035);
+        assert_eq!(lab.offences().len(), offences);
+    }
     let mut lab = Lab::new(Format::Sensorsini31);
     lab.order(Order::Command(1), 0.004);
     lab.order(Order::Command(2), 0.002);
