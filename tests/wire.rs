@@ -6,12 +6,15 @@ use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::Path;
 
+use coadapt::backend::emulator::Params;
+use coadapt::backend::emulator::faults::Faults;
 use coadapt::backend::wire::cobs1::frames as cobs1;
 use coadapt::backend::wire::sensorsini31::frames::{Reply, Request, raw_angles};
 use coadapt::backend::wire::{
-    Ack, Codec, Config, Firmware, FirmwareConfig, Flags, Hello, Message, Outcome, Readings,
+    Ack, Codec, Config, Firmware, FirmwareConfig, Flags, Format, Hello, Message, Outcome, Readings,
     Refusal, StateFrame, sensorsini31,
 };
+use coadapt::check::{Check, Checker};
 use serde_json::Value;
 
 /// A row of `tests/data/wire/sensorsini31.csv`.
@@ -304,4 +307,35 @@ fn the_frames_of_the_document_are_those_of_the_codec() {
         kinds.insert(frame.kind());
     }
     assert_eq!(kinds.len(), 13, "the document shows {kinds:?}");
+}
+
+#[test]
+fn the_fault_file_of_the_document_is_one() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/SERIAL-PROTOCOL.md");
+    let document = fs::read_to_string(path).unwrap();
+    let (_, file) = document.split_once("```ron\n").unwrap();
+    let (file, _) = file.split_once("```").unwrap();
+    let options =
+        ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+    let faults: Faults = options.from_str(file).unwrap();
+    let mut wrong = Vec::new();
+    faults.check(&mut Checker::new(&mut wrong));
+    assert_eq!((wrong, faults.events.len()), (Vec::new(), 7));
+}
+
+#[test]
+fn the_devices_that_come_along_are_right_and_the_robot_is_the_default() {
+    let options =
+        ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+    let [robot, board] = ["physical-cart-pole", "cobs-cart-pole"].map(|name| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("profiles/devices").join(name);
+        let text = fs::read_to_string(path.with_extension("ron")).unwrap();
+        let params: Params = options.from_str(&text).unwrap();
+        let mut wrong = Vec::new();
+        params.check(&mut Checker::new(&mut wrong));
+        assert_eq!(wrong, Vec::new(), "{name}");
+        params
+    });
+    assert_eq!(robot, Params::default());
+    assert_eq!(board.format, Format::Cobs1);
 }

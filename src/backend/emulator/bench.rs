@@ -224,7 +224,8 @@ impl Bench {
             .with(Flags::LIMIT_LEFT, left)
             .with(Flags::LIMIT_RIGHT, right)
             .with(Flags::ESTOP, rig.is_pressed());
-        let position = (rig.read(Sensor::Position) - self.middle) * self.direction;
+        let position =
+            rig.read(Sensor::Position).saturating_sub(self.middle).saturating_mul(self.direction);
         #[expect(clippy::cast_possible_truncation, reason = "it wraps after 71.6 min")]
         let time_us = now.wrapping_sub(self.epoch) as u32;
         StateFrame {

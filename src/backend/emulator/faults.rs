@@ -125,7 +125,11 @@ impl Check for Faults {
                 | Fault::Stuck { for_s, .. }
                 | Fault::Estop { for_s } => c.range("events.for_s", for_s, 0.0..=1e6),
                 Fault::Garbage { bytes } => c.count("events.bytes", bytes, 0..=4096),
-                Fault::Reset | Fault::Jump { .. } => {}
+                Fault::Jump { counts, .. } => {
+                    let is_allowed = counts.unsigned_abs() <= 1_000_000;
+                    c.demand(is_allowed, "events.counts", counts, "-1000000 to 1000000");
+                }
+                Fault::Reset => {}
             }
         }
     }

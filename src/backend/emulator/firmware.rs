@@ -110,7 +110,9 @@ impl Stm32 {
     }
 
     fn position(&self, rig: &Rig) -> i32 {
-        (rig.read(Sensor::Position) - self.ends.middle) * i32::from(self.ends.direction)
+        rig.read(Sensor::Position)
+            .saturating_sub(self.ends.middle)
+            .saturating_mul(i32::from(self.ends.direction))
     }
 
     fn apply(&mut self, command: i32, rig: &mut Rig) {

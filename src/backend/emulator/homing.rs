@@ -78,9 +78,9 @@ impl Homing {
             Leg::Middle => {
                 let middle = self.watched.midpoint(self.ahead);
                 let direction = if self.ahead < self.watched { -1 } else { 1 };
-                let left = (middle - position) * direction;
+                let left = middle.saturating_sub(position).saturating_mul(direction);
                 if left <= 1 {
-                    let reach = (self.ahead - middle).abs();
+                    let reach = self.ahead.saturating_sub(middle).saturating_abs();
                     let direction = if direction < 0 { -1 } else { 1 };
                     return Step::Done(Ends { direction, middle, reach });
                 }
@@ -94,7 +94,7 @@ impl Homing {
         if now < self.watched_at + WATCH_US {
             return false;
         }
-        let moved = (position - self.watched).abs();
+        let moved = position.saturating_sub(self.watched).saturating_abs();
         self.watched_at = now;
         self.watched = position;
         moved < STANDING

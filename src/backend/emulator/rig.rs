@@ -274,7 +274,7 @@ impl Rig {
     pub fn read(&self, sensor: Sensor) -> i32 {
         match self.stuck[sensor as usize] {
             Some((until, reading)) if self.now < until => reading,
-            _ => self.truth(sensor) + self.jumped[sensor as usize],
+            _ => self.truth(sensor).saturating_add(self.jumped[sensor as usize]),
         }
     }
 

@@ -1,3 +1,5 @@
+use proptest::prelude::*;
+
 use super::*;
 
 fn run(faults: &Faults, time: f64) -> Lab {
@@ -123,4 +125,51 @@ fn a_fault_file_is_read_and_checked() {
     let mut wrong = Vec::new();
     Params::default().check(&mut Checker::new(&mut wrong));
     assert_eq!(wrong, []);
+}
+
+/// Pieces of what a host may write: orders of either format, halves of them, rubbish.
+fn any_write() -> impl Strategy<Value = (Vec<u8>, f64)> {
+    let order = prop_oneof![
+        any::<i32>().prop_map(Order::Command),
+        Just(Order::Stop),
+        any::<bool>().prop_map(Order::Stream),
+        Just(Order::Home),
+        Just(Order::Query),
+        Just(Order::Arm { watchdog_ms: 100 }),
+        Just(Order::Configure(firmware_config(5))),
+    ];
+    let written = (any::<bool>(), order, 0..40_usize).prop_map(|(is_cobs1, order, cut)| {
+        let format = if is_cobs1 { Format::Cobs1 } else { Format::Sensorsini31 };
+        let mut bytes = Vec::new();
+        format.codec().encode(&order, &mut bytes).unwrap();
+        bytes.truncate(cut);
+        bytes
+    });
+    let bytes = prop_oneof![written, prop::collection::vec(any::<u8>(), 0..60)];
+    (bytes, 0.0..0.1)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn nothing_that_a_host_writes_breaks_an_emulated_device(
+        writes in prop::collection::vec(any_write(), 0..30),
+        is_cobs1 in any::<bool>(),
+    ) {
+        let format = if is_cobs1 { Format::Cobs1 } else { Format::Sensorsini31 };
+        let noise = Noise { drop: 0.01, flip: 0.01, delay: 0.1, ..Noise::default() };
+        let faults = Faults { to_host: noise.clone(), to_device: noise, ..Faults::default() };
+        let mut lab = Lab::with(&Params { format, ..Params::default() }, &faults);
+        for (bytes, time) in writes {
+            lab.write(&bytes, time);
+            if is_cobs1 {
+                prop_assert!(lab.device.command().abs() <= 7200);
+            }
+        }
+        lab.wait(40.0);
+        // A well-behaved board never drives on without its host.
+        prop_assert!(!is_cobs1 || lab.device.command() == 0);
+        prop_assert!(lab.device.state().is_finite());
+    }
 }
