@@ -235,7 +235,7 @@ impl Emulator {
         self.to_device.send(bytes, self.now());
         let outstanding = self.to_device.waiting();
         if let Some(oracle) = &mut self.oracle {
-            let offences = oracle.bytes(outstanding, micros(self.now_us));
+            let offences = oracle.bytes(bytes, outstanding, micros(self.now_us));
             self.accuse(offences);
         }
         for order in self.ear.hear(bytes) {

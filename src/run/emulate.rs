@@ -74,11 +74,11 @@ struct Stand {
 impl Stand {
     fn turn(&mut self) -> Result<(), RunError> {
         self.plug()?;
-        let written = self.hear().map_err(broken)?;
+        let written = self.hear().map_err(|error| broken(&error))?;
         self.stand_still()?;
         let read = self.device.advance(self.now(), &written);
         if let Some(port) = self.port.as_ref().filter(|_| self.is_open) {
-            let lost = port.write(&read).map_err(broken)?;
+            let lost = port.write(&read).map_err(|error| broken(&error))?;
             if lost > 0 {
                 self.notes.happens(self.device.now(), &Happening::Unread { bytes: lost })?;
             }
@@ -152,7 +152,7 @@ impl Stand {
     }
 }
 
-fn broken(error: io::Error) -> RunError {
+fn broken(error: &io::Error) -> RunError {
     RunError::Failed(format!("the emulated port broke: {error}"))
 }
 

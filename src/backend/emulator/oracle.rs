@@ -8,6 +8,8 @@ use crate::signal::Seconds;
 
 /// The most bytes that may be under way to the firmware, whose buffer holds 32.
 pub const MOST_OUTSTANDING: usize = 24;
+/// With a burst of stops, which may follow a motor command at once: an emergency does not wait.
+pub const MOST_WITH_STOPS: usize = 32;
 /// The largest share of full duty.
 pub const MOST_DUTY: f64 = 0.95;
 /// Two different commands keep this distance if the device says nothing between them: it is
@@ -78,14 +80,15 @@ impl Oracle {
         Self { full_scale, ..Self::default() }
     }
 
-    /// Judges the bytes of one write at `now`: `outstanding` are under way with them.
-    pub fn bytes(&mut self, outstanding: usize, now: Seconds) -> Vec<Offence> {
+    /// Judges the bytes `written` at once at `now`: `outstanding` are under way with them.
+    pub fn bytes(&mut self, written: &[u8], outstanding: usize, now: Seconds) -> Vec<Offence> {
         let mut offences = Vec::new();
         let is_asked = self.deaf.is_some_and(|since| now < since + HOMING_SHOWS);
         if is_asked || self.is_homing {
             offences.push(Offence::WhileDeaf);
         }
-        if outstanding > MOST_OUTSTANDING {
+        let most = if are_stops(written) { MOST_WITH_STOPS } else { MOST_OUTSTANDING };
+        if outstanding > most {
             offences.push(Offence::TooManyBytes);
         }
         offences
@@ -160,4 +163,11 @@ impl Oracle {
             Kind::Reply => {}
         }
     }
+}
+
+/// Whether these are copies of the frame that stops the motor, and nothing else.
+fn are_stops(written: &[u8]) -> bool {
+    let mut stop = Vec::new();
+    Request::SetMotor(0).encode(&mut stop);
+    written.chunks(stop.len()).all(|frame| frame == stop)
 }

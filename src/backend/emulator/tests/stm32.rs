@@ -69,7 +69,12 @@ fn a_stop_is_safe_after_another_command_and_after_half_of_one() {
     let all = [&[Request::SetMotor(1234)][..], &stop].concat();
     lab.write_while_busy(&all);
     lab.wait(0.05);
-    assert_eq!(lab.last().command, 0);
+    assert_eq!((lab.last().command, lab.crashed()), (0, false));
+    assert_eq!(lab.offences(), [Offence::TooManyBytes], "in one write");
+    let mut lab = streaming();
+    lab.order(Order::Command(1234), 0.0001);
+    lab.order(Order::Stop, 0.05);
+    assert_eq!((lab.last().command, lab.offences()), (0, vec![]));
     let mut lab = streaming();
     lab.order(Order::Command(2000), 0.05);
     lab.write(&[0xAA, 0xC8, 8, 0x10, 0x0E], 0.001);
