@@ -1,7 +1,7 @@
 //! An emulated device on a pseudo-terminal, from the outside.
 
 #![cfg(unix)]
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking, helpers too")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking, helpers too")]
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Write};
