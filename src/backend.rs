@@ -1,8 +1,10 @@
 //! Where the plant lives: in the computer or at the end of a wire.
 
+pub mod emulator;
 pub mod safety;
 pub mod serial;
 pub mod simulated;
+pub mod wire;
 
 use crate::random::Place;
 use crate::signal::{Action, Seconds, State};

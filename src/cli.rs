@@ -45,6 +45,8 @@ pub enum Command {
     Simulate(Simulate),
     /// This computer's gamepad for a session at another: lines on standard output.
     PadRelay(PadRelay),
+    /// A plant's device without hardware, on a pseudo-terminal, in real time.
+    Emulate(Emulate),
     /// Look at profiles.
     #[command(subcommand)]
     Profile(Profile),
@@ -228,6 +230,35 @@ pub struct PadRelay {
     /// Relay a table of events in place of a pad: columns t,event,pad,what,value.
     #[arg(long, value_name = "FILE", conflicts_with = "forward")]
     pub events: Option<PathBuf>,
+}
+
+const EMULATE_EXAMPLES: &str = "\
+Examples:
+  coadapt emulate physical-cart-pole --port-link /tmp/cp0
+  coadapt emulate cobs-cart-pole --faults faults.ron --seed 7 --json > trace.jsonl
+
+The first line on standard output is the port; with --json every line is an object with at_s and
+what: written (by the host), obeyed, delivered (to the host), motor, homing_began, fault, forbidden …
+docs/SERIAL-PROTOCOL.md has the faults and what a host must never do. Ctrl-C ends.";
+
+/// The words of `emulate`.
+#[derive(Args, Debug)]
+#[command(after_help = EMULATE_EXAMPLES)]
+pub struct Emulate {
+    /// physical-cart-pole, cobs-cart-pole, or the path of a device in RON (profiles/devices/).
+    pub profile: String,
+    /// Make a link to the port here, which stays when the port gets another name.
+    #[arg(long, value_name = "PATH")]
+    pub port_link: Option<PathBuf>,
+    /// What goes wrong on purpose.
+    #[arg(long, value_name = "FILE.ron")]
+    pub faults: Option<PathBuf>,
+    /// The seed of the wire's and the plant's noise.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Print the trace, one JSON object a line.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// The words of `profile`.

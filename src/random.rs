@@ -28,6 +28,8 @@ pub enum Purpose {
     Bootstrap = 7,
     /// What a reinforcement learner tries within a rollout.
     Exploration = 8,
+    /// The faults of an emulated device and its wire.
+    Wire = 9,
 }
 
 /// The place of a rollout within a session.

@@ -2,6 +2,8 @@
 
 mod choose;
 mod devices;
+#[cfg(unix)]
+mod emulate;
 mod evaluate;
 mod fit;
 pub mod outcome;
@@ -69,6 +71,12 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Fit(words)) => fit::fit(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::PadRelay(words)) => pad_relay::pad_relay(words),
+        #[cfg(unix)]
+        Some(Command::Emulate(words)) => emulate::emulate(words),
+        #[cfg(not(unix))]
+        Some(Command::Emulate(_)) => {
+            Err(RunError::Usage("this system has no pseudo-terminals".to_owned()))
+        }
         Some(Command::Profile(profile)) => words::profile(profile),
         Some(Command::Devices(words)) => devices::devices(words),
     }
