@@ -5,7 +5,8 @@
 //! counts, ticks and microseconds; whoever knows the plant scales them.
 //!
 //! A message that a codec hands out was whole and its checksum was right. Whether its numbers
-//! make sense for the plant, such as a cart beyond its track, is for the caller to judge.
+//! make sense for the plant, such as a cart beyond its track, is for the caller to judge; a
+//! checksum of 8 bits lets one in 256 chance frames pass, and a float in one may be NaN.
 //!
 //! | format | device | numbered | acknowledged | the device's watchdog |
 //! | --- | --- | --- | --- | --- |

@@ -182,7 +182,8 @@ proptest! {
             rest = after;
             if rest.is_empty() { break; }
         }
-        prop_assert_eq!(&heard, &whole);
+        // As words: chance makes floats that are no numbers, which equal nothing.
+        prop_assert_eq!(format!("{heard:?}"), format!("{whole:?}"));
         prop_assert_eq!(host.counts(), counts);
         // Every byte is in a message, skipped, or the beginning of a message.
         prop_assert!(counts.skipped <= bytes.len() as u64);
