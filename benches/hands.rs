@@ -3,7 +3,7 @@
 //!
 //! ```sh
 //! cargo bench --bench hands                  # 300 events of each device
-//! HANDS_TRIES=1000 cargo bench --bench hands
+//! HANDS_TRIES=1000 HANDS_DEVICE=mouse cargo bench --bench hands
 //! ```
 //!
 //! The program starts itself once more on a pseudo-terminal. That child has the real screen
@@ -217,6 +217,7 @@ mod parent {
     }
 
     pub(super) fn run() {
+        let only = std::env::var("HANDS_DEVICE").ok();
         let tries = std::env::var("HANDS_TRIES").ok().and_then(|n| n.parse().ok()).unwrap_or(300);
         println!("device     event to action, ms: p50    p99    max   (a tick is 20 ms)");
         let pad = || {
@@ -233,7 +234,9 @@ mod parent {
         for (name, hand) in
             [("keyboard", Hand::Keys), ("mouse", Hand::Mouse { column: 20 }), ("gamepad", pad())]
         {
-            Device { name, hand }.measure(tries);
+            if only.as_ref().is_none_or(|only| only == name) {
+                Device { name, hand }.measure(tries);
+            }
         }
     }
 
@@ -242,12 +245,13 @@ mod parent {
             let folder = tempfile::tempdir().expect("a folder");
             let (mut child, pipe) = start(self.name, folder.path());
             rest(1.0);
-            write(&pipe, b"\r");
             if let Hand::Pad { stream, .. } = &mut self.hand {
                 *stream = Some(UnixStream::connect(folder.path().join("pad")).expect("a socket"));
             }
             self.send(&pipe, 0.0);
-            rest(0.5);
+            self.rest_for(&pipe, 0.3);
+            write(&pipe, b"\r");
+            self.rest_for(&pipe, 0.5);
 
             // Pushes and rests at times that have nothing to do with the ticks.
             let mut chance = stream(1, Purpose::Starts, Place::default());
@@ -260,9 +264,9 @@ mod parent {
                 self.send(&pipe, 0.0);
             }
             // Then quiet, then a flood of so many events a second.
-            let quiet = span(|| rest(5.0));
+            let quiet = span(|| self.rest_for(&pipe, 5.0));
             let thousand = span(|| self.flood(&pipe, 1000, 10.0));
-            rest(0.5);
+            self.rest_for(&pipe, 0.5);
             let flood = span(|| self.flood(&pipe, 5000, 10.0));
             self.send(&pipe, 0.0);
             rest(0.3);
