@@ -249,24 +249,24 @@ mod parent {
                 *stream = Some(UnixStream::connect(folder.path().join("pad")).expect("a socket"));
             }
             self.send(&pipe, 0.0);
-            self.rest_for(&pipe, 0.3);
+            self.rest_for(0.3);
             write(&pipe, b"\r");
-            self.rest_for(&pipe, 0.5);
+            self.rest_for(0.5);
 
             // Pushes and rests at times that have nothing to do with the ticks.
             let mut chance = stream(1, Purpose::Starts, Place::default());
             let mut sent = Vec::new();
             for _ in 0..tries {
-                self.rest_for(&pipe, 0.12 + chance.random_range(0.0..0.05));
+                self.rest_for(0.12 + chance.random_range(0.0..0.05));
                 sent.push(monotonic());
                 self.send(&pipe, 1.0);
-                self.rest_for(&pipe, 0.06 + chance.random_range(0.0..0.05));
+                self.rest_for(0.06 + chance.random_range(0.0..0.05));
                 self.send(&pipe, 0.0);
             }
             // Then quiet, then a flood of so many events a second.
-            let quiet = span(|| self.rest_for(&pipe, 5.0));
+            let quiet = span(|| self.rest_for(5.0));
             let thousand = span(|| self.flood(&pipe, 1000, 10.0));
-            self.rest_for(&pipe, 0.5);
+            self.rest_for(0.5);
             let flood = span(|| self.flood(&pipe, 5000, 10.0));
             self.send(&pipe, 0.0);
             rest(0.3);
@@ -319,7 +319,7 @@ mod parent {
         }
 
         /// Lets time pass; a relay sends its heartbeat meanwhile.
-        fn rest_for(&mut self, _pipe: &Pipe, time_s: f64) {
+        fn rest_for(&mut self, time_s: f64) {
             let clock = WallClock::start();
             while clock.now().0 < time_s {
                 rest((time_s - clock.now().0).clamp(0.0, 0.02));

@@ -37,11 +37,6 @@ impl Badge {
         *self.signs() = Signs { words, state, trouble };
     }
 
-    /// Says what is wrong and what to do about it, or that all is well.
-    pub fn set_trouble(&self, trouble: Option<String>) {
-        self.signs().trouble = trouble;
-    }
-
     /// Which device it is, and how it is known.
     #[must_use]
     pub fn words(&self) -> String {
