@@ -3,6 +3,7 @@
 pub mod safety;
 pub mod serial;
 pub mod simulated;
+pub mod wire;
 
 use crate::random::Place;
 use crate::signal::{Action, Seconds, State};

@@ -26,6 +26,8 @@ pub enum Purpose {
     Assignment = 6,
     /// Resampling for intervals.
     Bootstrap = 7,
+    /// The faults of an emulated device and its wire.
+    Wire = 8,
 }
 
 /// The place of a rollout within a session.
