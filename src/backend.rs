@@ -1,5 +1,6 @@
 //! Where the plant lives: in the computer or at the end of a wire.
 
+pub mod emulator;
 pub mod safety;
 pub mod serial;
 pub mod simulated;

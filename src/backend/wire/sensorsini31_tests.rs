@@ -20,9 +20,9 @@ fn bytes(reply: &Reply) -> Vec<u8> {
 
 /// A state of another firmware, `len` bytes long.
 fn other(len: u8, fill: u8) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    frames::frame(STATE, None, &mut bytes, |out| out.resize(usize::from(len) - 1, fill));
-    assert_eq!(bytes.len(), usize::from(len));
+    let mut bytes = vec![START, STATE, len];
+    bytes.resize(usize::from(len) - 1, fill);
+    bytes.push(checksum(&bytes));
     bytes
 }
 

@@ -77,7 +77,7 @@ impl Request {
 
     /// Appends the frame.
     pub fn encode(&self, out: &mut Vec<u8>) {
-        frame(self.code(), None, out, |out| match self {
+        frame(self.code(), out, |out| match self {
             Self::Ping
             | Self::Calibrate
             | Self::GetPidConfig
@@ -153,21 +153,21 @@ impl Reply {
     /// Appends the bytes that the firmware really sends, stray ones included.
     pub fn encode(&self, out: &mut Vec<u8>) {
         match self {
-            Self::Pong => frame(0xC0, None, out, |_| {}),
-            Self::State(state) => frame(STATE, None, out, |out| put_state(state, out)),
+            Self::Pong => frame(0xC0, out, |_| {}),
+            Self::State(state) => frame(STATE, out, |out| put_state(state, out)),
             Self::Calibrated(direction) => {
-                frame(0xC2, None, out, |out| out.extend(direction.to_le_bytes()));
+                frame(0xC2, out, |out| out.extend(direction.to_le_bytes()));
             }
             Self::Pid(gains) => {
-                frame(0xC5, None, out, |out| put_floats(gains, out));
+                frame(0xC5, out, |out| put_floats(gains, out));
                 out.extend([0; 6]);
             }
             Self::Config(config) => {
-                frame(0xC7, None, out, |out| put_config(config, out));
+                frame(0xC7, out, |out| put_config(config, out));
                 out.extend([0; 2]);
             }
             Self::Experiment(samples) => {
-                frame(0xCE, None, out, |out| out.extend(samples.to_le_bytes()));
+                frame(0xCE, out, |out| out.extend(samples.to_le_bytes()));
             }
             Self::RawAngles(readings) => {
                 // `(4 + 2n) & 0xFF`, as the firmware computes it.
@@ -209,25 +209,47 @@ pub fn raw_angles(frame: &[u8], count: u16) -> Option<Vec<u16>> {
     f.end(readings)
 }
 
+/// Appends `state` in the layout of another firmware: 17 bytes (2021-12 to 2023-09) or 27
+/// (2024-01 to 2024-07); any other length is filled with zeros.
+pub fn other_layout(state: &StateFrame, len: u8, out: &mut Vec<u8>) {
+    const AROUND: usize = 4;
+    frame(STATE, out, |out| {
+        let start = out.len();
+        let sensor = |index: usize| low(state.sensors.get(index).copied().unwrap_or(0));
+        let firmware = state.firmware.unwrap_or_default();
+        out.extend([sensor(0), sensor(1)].concat());
+        if len == 27 {
+            out.extend(firmware.target_position_m.to_le_bytes());
+        }
+        out.extend(low(state.command));
+        out.push(firmware.invalid_steps);
+        if len == 27 {
+            out.extend(state.time_difference_us.unwrap_or(0).to_le_bytes());
+        }
+        out.extend(state.time_us.to_le_bytes());
+        out.extend(firmware.latency_10us.to_le_bytes());
+        out.resize(start + usize::from(len).saturating_sub(AROUND), 0);
+    });
+}
+
+/// The low 16 bits: what does not fit loses the others, as on the board.
+fn low(reading: i32) -> [u8; 2] {
+    [reading.to_le_bytes()[0], reading.to_le_bytes()[1]]
+}
+
 /// The checksum of all bytes of a frame but the last.
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> u8 {
     CRC.checksum(bytes)
 }
 
-/// Appends a frame with what `payload` writes; `len` in place of its true length.
-pub(super) fn frame(
-    code: u8,
-    len: Option<u8>,
-    out: &mut Vec<u8>,
-    payload: impl FnOnce(&mut Vec<u8>),
-) {
+/// Appends a frame with what `payload` writes.
+fn frame(code: u8, out: &mut Vec<u8>, payload: impl FnOnce(&mut Vec<u8>)) {
     let start = out.len();
     out.extend([START, code, 0]);
     payload(out);
-    // No frame is longer than 34 bytes.
-    let true_len = (out.len() - start + 1).to_le_bytes()[0];
-    out[start + 2] = len.unwrap_or(true_len);
+    // No frame is longer than 35 bytes.
+    out[start + 2] = (out.len() - start + 1).to_le_bytes()[0];
     let crc = checksum(&out[start..]);
     out.push(crc);
 }
@@ -279,8 +301,6 @@ fn config(f: &mut Fields<'_>) -> Option<Config> {
 
 fn put_state(state: &StateFrame, out: &mut Vec<u8>) {
     let firmware = state.firmware.unwrap_or_default();
-    // What does not fit loses its high bits, as on the board.
-    let low = |reading: i32| [reading.to_le_bytes()[0], reading.to_le_bytes()[1]];
     let sensor = |index: usize| low(state.sensors.get(index).copied().unwrap_or(0));
     out.extend(sensor(0));
     out.extend(firmware.angle_change.to_le_bytes());
