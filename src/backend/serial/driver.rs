@@ -152,6 +152,7 @@ pub struct Driver {
     follows: bool,
     sensible: u32,
     is_homed: bool,
+    wants_home: bool,
     wanted: Option<Wanted>,
     /// A state came that has not been answered with a command.
     owes: bool,
@@ -182,6 +183,7 @@ impl Driver {
             follows: false,
             sensible: 0,
             is_homed: false,
+            wants_home: false,
             wanted: None,
             owes: false,
             speed: 0.0,
@@ -201,6 +203,7 @@ impl Driver {
         self.is_homed = !self.params.homing;
         self.sensible = 0;
         self.owes = false;
+        self.wants_home = false;
         self.wanted = None;
         self.steps = steps(&self.params).into();
         self.since = now;
@@ -234,8 +237,7 @@ impl Driver {
             match heard {
                 Ok(message) => self.hear(message, now),
                 Err(refusal) => {
-                    self.stop(now);
-                    self.stage = Stage::Closed(refusal.to_string());
+                    self.close(now, &refusal.to_string());
                     return;
                 }
             }
@@ -343,12 +345,20 @@ impl Driver {
         if self.warden.latest().is_none_or(|seen| seen.held.is_some_and(|held| held != 0)) {
             return Err(NotArmed::Moving);
         }
+        self.wants_home = true;
+        self.since = now;
+        Ok(())
+    }
+
+    /// Homing takes the place of a state's command: two different orders between two states
+    /// would be mixed up by the board.
+    fn begin_homing(&mut self, now: Seconds) {
         self.write(&Order::Home);
+        self.wants_home = false;
         self.stage = Stage::Homing;
         self.since = now;
         self.is_homed = false;
         self.owes = false;
-        Ok(())
     }
 
     /// What is to be written to the port now.
@@ -454,6 +464,9 @@ impl Driver {
                 self.confirm(frame.command, now);
                 self.owes = true;
                 self.heed(now);
+                if self.wants_home && self.owes && frame.command == 0 {
+                    self.begin_homing(now);
+                }
             }
             _ => {}
         }
@@ -501,6 +514,12 @@ impl Driver {
     }
 
     fn stop(&mut self, now: Seconds) {
+        // The first thing that a greeting says is that the motor stops; more would only get in
+        // its way.
+        if self.stage == Stage::Opening {
+            return;
+        }
+        self.wants_home = false;
         // Whatever else waits would only come before it.
         self.out.clear();
         self.write(&Order::Stop);
@@ -531,9 +550,9 @@ impl Driver {
     }
 
     fn close(&mut self, now: Seconds, why: &str) {
-        self.stop(now);
         self.warden.disarm();
         self.stage = Stage::Closed(why.to_owned());
+        self.stop(now);
         self.steps.clear();
     }
 

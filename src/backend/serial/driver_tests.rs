@@ -210,7 +210,13 @@ fn random_faults(seed: u64) -> Faults {
         };
         events.push(Timed { at_s: chance.random_range(0.0..3.0), what });
     }
-    Faults { to_host, to_device, garbage_at_connect: chance.random_range(0..50), version: None, events }
+    Faults {
+        to_host,
+        to_device,
+        garbage_at_connect: chance.random_range(0..50),
+        version: None,
+        events,
+    }
 }
 
 /// Sessions of random faults: whatever happens, the driver writes nothing that it must not,
