@@ -134,7 +134,7 @@ impl Emulator {
                 let layout = faults.version.map(|len| len.to_le_bytes()[0]);
                 let turn = params.rig.angle.counts_per_turn;
                 let board = firmware::Stm32::new(turn, params.baud.0, layout);
-                (Box::new(board), Some(Oracle::new(rig.full_scale())))
+                (Box::new(board), Some(Oracle::new(rig.full_scale(), params.baud.0)))
             }
             Format::Cobs1 => {
                 (Box::new(bench::Bench::new(faults.version.unwrap_or(cobs1::VERSION))), None)
@@ -233,9 +233,8 @@ impl Emulator {
             return;
         }
         self.to_device.send(bytes, self.now());
-        let outstanding = self.to_device.waiting();
         if let Some(oracle) = &mut self.oracle {
-            let offences = oracle.bytes(bytes, outstanding, micros(self.now_us));
+            let offences = oracle.bytes(bytes, micros(self.now_us));
             self.accuse(offences);
         }
         for order in self.ear.hear(bytes) {

@@ -3,6 +3,8 @@
 //! What may go to the plant is decided by a pure function of the limits, what was sensed
 //! and what is wanted. A trip is latched: the plant receives 0 until a person begins anew.
 
+pub mod warden;
+
 use super::{Backend, Sensed};
 use crate::random::Place;
 use crate::signal::{Action, Seconds, State};

@@ -78,12 +78,6 @@ impl Line {
         through <= now && now >= self.stalled_until
     }
 
-    /// The number of bytes on their way.
-    #[must_use]
-    pub fn waiting(&self) -> usize {
-        self.coming.len()
-    }
-
     /// Holds everything back until `until`.
     pub const fn stall(&mut self, until: Seconds) {
         self.stalled_until = until;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::trace::{Entry, Event, Kind, Written};
+use crate::backend::wire::on_the_wire;
 use crate::backend::wire::sensorsini31::frames::{Request, SET_PID_CONFIG};
 use crate::signal::Seconds;
 
@@ -48,6 +49,10 @@ pub enum Offence {
 #[derive(Clone, Debug, Default)]
 pub struct Oracle {
     full_scale: i32,
+    baud: u32,
+    /// When all that was written would be through on a line that holds nothing up: of delays the
+    /// host knows nothing.
+    through: Seconds,
     /// The last command, and when it was written.
     last: Option<(Seconds, Written)>,
     /// The device has said something since.
@@ -74,21 +79,25 @@ enum Stream {
 }
 
 impl Oracle {
-    /// A judge over a board whose motor is fully driven by `full_scale`.
+    /// A judge over a board at `baud` whose motor is fully driven by `full_scale`.
     #[must_use]
-    pub fn new(full_scale: i32) -> Self {
-        Self { full_scale, ..Self::default() }
+    pub fn new(full_scale: i32, baud: u32) -> Self {
+        Self { full_scale, baud, ..Self::default() }
     }
 
-    /// Judges the bytes `written` at once at `now`: `outstanding` are under way with them.
-    pub fn bytes(&mut self, written: &[u8], outstanding: usize, now: Seconds) -> Vec<Offence> {
+    /// Judges the bytes `written` at once at `now`.
+    pub fn bytes(&mut self, written: &[u8], now: Seconds) -> Vec<Offence> {
         let mut offences = Vec::new();
+        let start = if self.through > now { self.through } else { now };
+        self.through = start + on_the_wire(written.len(), self.baud);
+        let outstanding = self.through - now;
         let is_asked = self.deaf.is_some_and(|since| now < since + HOMING_SHOWS);
         if is_asked || self.is_homing {
             offences.push(Offence::WhileDeaf);
         }
         let most = if are_stops(written) { MOST_WITH_STOPS } else { MOST_OUTSTANDING };
-        if outstanding > most {
+        // Half a byte more than the most is none.
+        if outstanding > on_the_wire(2 * most + 1, self.baud) * 0.5 {
             offences.push(Offence::TooManyBytes);
         }
         offences
@@ -104,7 +113,10 @@ impl Oracle {
                     Event::Delivered { message } => self.delivered(*message),
                     Event::HomingBegan => self.is_homing = true,
                     Event::HomingEnded { .. } => self.is_homing = false,
-                    Event::Started => *self = Self::new(self.full_scale),
+                    Event::Started => {
+                        *self =
+                            Self { through: self.through, ..Self::new(self.full_scale, self.baud) }
+                    }
                     _ => {}
                 }
                 Vec::new()

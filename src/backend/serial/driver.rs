@@ -1,0 +1,679 @@
+//! The host's side of a device, without the port: what to write, and when, from what was read.
+//!
+//! A pure function of time and bytes. [`Driver`] opens a device step by step, homes it, keeps
+//! the [`Warden`] informed, and writes at most one command for each state that came. Whoever
+//! owns the port moves bytes between the two, and passes the time on.
+//!
+//! ```text
+//!          opened            the steps of the format          home        homed
+//! Closed ─────────▶ Opening ─────────────────────────▶ Ready ──────▶ Homing ─────▶ Ready
+//!    ▲                 │ no answer, another device        │  ▲                       (homed)
+//!    └──── lost ───────┴──────────────────────────────────┘  └── arm: the warden's affair
+//! ```
+
+use std::collections::VecDeque;
+
+use serde::{Deserialize, Serialize};
+
+use super::scales::{self, Tracker};
+use crate::backend::safety::warden::{self, Fault, Observation, Standing, Wanted, Warden};
+use crate::backend::wire::{
+    Codec, Config, Counts, FirmwareConfig, Flags, Format, Message, Order, Outcome, StateFrame,
+};
+use crate::check::{Check, Checker};
+use crate::signal::{Seconds, State};
+
+/// A device's parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Params {
+    /// What it speaks.
+    pub format: Format,
+    /// The time between two states, ms.
+    pub period_ms: u16,
+    /// [`Format::Sensorsini31`]: the number of readings whose median is the angle.
+    pub average: u16,
+    /// [`Format::Cobs1`]: the device stops by itself when no command came for so long, ms; 0:
+    /// five periods.
+    pub watchdog_ms: u16,
+    /// How long the board starts after its port was opened, s.
+    pub start_s: f64,
+    /// Whether it must find its ends before it may be armed.
+    pub homing: bool,
+    /// From counts to the plant, and back.
+    pub scales: scales::Params,
+    /// The plant's limits.
+    pub safety: warden::Params,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            format: Format::default(),
+            period_ms: 20,
+            average: 1,
+            watchdog_ms: 0,
+            start_s: 0.0,
+            homing: true,
+            scales: scales::Params::default(),
+            safety: warden::Params::default(),
+        }
+    }
+}
+
+impl Check for Params {
+    fn check(&self, c: &mut Checker<'_>) {
+        c.count("period_ms", self.period_ms.into(), 2..=50);
+        c.count("average", self.average.into(), 1..=32);
+        c.count("watchdog_ms", self.watchdog_ms.into(), 0..=250);
+        c.range("start_s", self.start_s, 0.0..=10.0);
+        self.scales.check(&mut c.section("scales"));
+        self.safety.check(&mut c.section("safety"));
+    }
+}
+
+/// How far a device has come.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stage {
+    /// No device, for this reason.
+    Closed(String),
+    /// It is being greeted.
+    Opening,
+    /// It sends states and takes commands, if armed.
+    Ready,
+    /// It looks for its ends, deaf and dumb.
+    Homing,
+}
+
+/// What a step of the opening waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Awaits {
+    /// Nothing but its time.
+    Time,
+    /// The device's configuration or name.
+    Identity,
+    /// So many states that make sense.
+    States,
+}
+
+/// A step of the opening: what is written, and what must come before the next one.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    order: Order,
+    awaits: Awaits,
+}
+
+/// The least time between two different orders to a device that sends no states.
+const SPACING: Seconds = Seconds(0.005);
+/// How long an answer may take,
+const PATIENCE: Seconds = Seconds(0.5);
+/// and homing.
+const HOMING: Seconds = Seconds(30.0);
+/// What is said of homing that takes longer.
+const STUCK: &str = "homing does not end: switch the motor's supply off, then look whether the \
+    cart is stuck";
+/// States that must make sense before a device counts as ready.
+const STATES: u32 = 10;
+/// What is said of a device that does not answer.
+const SILENT: &str = "the device does not answer: look at its power, its cable, its baud rate and \
+    its firmware";
+/// A stop that the device has not confirmed after so many periods is said to be unconfirmed.
+const CONFIRMED_WITHIN: f64 = 3.0;
+
+/// Whether the device has said that its motor is off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stopped {
+    /// Nobody asked.
+    No,
+    /// It was told, and may not have answered yet.
+    Told,
+    /// It holds 0.
+    Confirmed,
+    /// It was told and does not say so.
+    Unconfirmed,
+}
+
+/// The host's side of one device.
+pub struct Driver {
+    params: Params,
+    limit: f64,
+    codec: Box<dyn Codec>,
+    warden: Warden,
+    tracker: Tracker,
+    stage: Stage,
+    steps: VecDeque<Step>,
+    /// When the present stage began.
+    since: Seconds,
+    /// When the next step of the opening is due,
+    due: Seconds,
+    /// and when its order was written.
+    asked: Option<Seconds>,
+    /// The device has said that it follows commands.
+    follows: bool,
+    sensible: u32,
+    is_homed: bool,
+    wants_home: bool,
+    wanted: Option<Wanted>,
+    /// A state came that has not been answered with a command.
+    owes: bool,
+    speed: f64,
+    /// When a stop was written that is not confirmed yet.
+    stopping: Option<Seconds>,
+    stopped: Stopped,
+    /// When a burst of stops was written, after which nothing was.
+    burst: Option<Seconds>,
+    damaged: u64,
+    out: Vec<u8>,
+}
+
+impl Driver {
+    /// A driver for a device that is not there yet, of a plant with actions up to ± `limit`.
+    #[must_use]
+    pub fn new(params: &Params, limit: f64) -> Self {
+        let period = period(params);
+        Self {
+            params: params.clone(),
+            limit,
+            codec: params.format.codec(),
+            warden: Warden::new(params.safety.clone(), limit, period),
+            tracker: Tracker::new(params.scales.clone(), period),
+            stage: Stage::Closed("not opened yet".to_owned()),
+            steps: VecDeque::new(),
+            since: Seconds(0.0),
+            due: Seconds(0.0),
+            asked: None,
+            follows: false,
+            sensible: 0,
+            is_homed: false,
+            wants_home: false,
+            wanted: None,
+            owes: false,
+            speed: 0.0,
+            stopping: None,
+            stopped: Stopped::No,
+            burst: None,
+            damaged: 0,
+            out: Vec::new(),
+        }
+    }
+
+    /// The port is open at `now`: the motor is stopped first, then the device is greeted.
+    pub fn opened(&mut self, now: Seconds) {
+        self.codec.restart();
+        self.warden.forget();
+        self.tracker.forget();
+        self.stage = Stage::Opening;
+        self.is_homed = !self.params.homing;
+        self.sensible = 0;
+        self.owes = false;
+        self.wants_home = false;
+        self.wanted = None;
+        self.steps = steps(&self.params).into();
+        self.since = now;
+        self.due = now + Seconds(self.params.start_s);
+        self.asked = None;
+        self.stopped = Stopped::No;
+        self.stopping = None;
+        self.burst = None;
+    }
+
+    /// The port is gone: nothing more can be written, and nothing holds any more.
+    pub fn lost(&mut self, why: impl Into<String>) {
+        let was_armed = self.warden.standing() == Standing::Armed;
+        self.stage = Stage::Closed(why.into());
+        self.steps.clear();
+        self.out.clear();
+        self.owes = false;
+        self.is_homed = false;
+        self.warden.forget();
+        if was_armed {
+            self.stopped = Stopped::Unconfirmed;
+        }
+    }
+
+    /// Takes bytes that were read at `now`.
+    pub fn read(&mut self, bytes: &[u8], now: Seconds) {
+        if matches!(self.stage, Stage::Closed(_)) {
+            return;
+        }
+        self.codec.take(bytes);
+        while let Some(heard) = self.codec.hear() {
+            match heard {
+                Ok(message) => self.hear(message, now),
+                Err(refusal) => {
+                    self.close(now, &refusal.to_string());
+                    return;
+                }
+            }
+        }
+        let damaged = self.codec.counts().checksum_errors;
+        if self.stage == Stage::Ready {
+            (self.damaged..damaged).for_each(|_| self.warden.damaged(now));
+        }
+        self.damaged = damaged;
+    }
+
+    /// Time goes on to `now`.
+    pub fn pass(&mut self, now: Seconds) {
+        match self.stage {
+            Stage::Closed(_) => return,
+            Stage::Opening => self.open(now),
+            Stage::Homing if (now - self.since).0 > HOMING.0 => {
+                self.close(now, STUCK);
+            }
+            // Homing is silent.
+            Stage::Homing => return,
+            Stage::Ready => self.warden.pass(now),
+        }
+        self.heed(now);
+    }
+
+    /// What the caller wants from now on.
+    pub fn want(&mut self, wanted: Wanted) {
+        self.wanted = Some(wanted);
+    }
+
+    /// Whether a state came that waits for its command.
+    #[must_use]
+    pub const fn owes_command(&self) -> bool {
+        self.owes
+    }
+
+    /// Writes the one command that the latest state allows, if it was not written yet, and
+    /// returns the action that it stands for.
+    pub fn answer(&mut self, now: Seconds) -> Option<f64> {
+        if self.stage != Stage::Ready || !std::mem::take(&mut self.owes) {
+            return None;
+        }
+        let action = self.warden.allow(self.wanted, now);
+        self.heed(now);
+        if self.stopping.is_some_and(|at| at == now) {
+            // The stop that was just written is this state's command.
+            return Some(0.0);
+        }
+        let command = self.params.scales.command(action / self.limit, self.speed);
+        let is_followed =
+            self.params.format == Format::Sensorsini31 || self.warden.standing() == Standing::Armed;
+        if is_followed {
+            self.write(&Order::Command(command));
+            self.warden.sent(command.into());
+        }
+        Some(action)
+    }
+
+    /// A person arms the motor.
+    ///
+    /// # Errors
+    /// Why it stays off, and what to do first.
+    pub fn arm(&mut self, now: Seconds) -> Result<(), NotArmed> {
+        match self.stage {
+            Stage::Ready if self.is_homed => {}
+            Stage::Ready => return Err(NotArmed::NotHomed),
+            _ => return Err(NotArmed::NotReady),
+        }
+        self.warden.arm(now)?;
+        self.wanted = None;
+        self.follows = false;
+        self.stopped = Stopped::No;
+        self.stopping = None;
+        self.write(&Order::Arm { watchdog_ms: self.params.watchdog_ms });
+        Ok(())
+    }
+
+    /// Stops the motor; it must be armed again.
+    pub fn disarm(&mut self, now: Seconds) {
+        self.warden.disarm();
+        self.stop(now);
+    }
+
+    /// The emergency stop.
+    pub fn emergency(&mut self, now: Seconds) {
+        self.warden.latch(Fault::Stopped);
+        self.stop(now);
+    }
+
+    /// A person has seen what was wrong.
+    pub fn clear(&mut self) {
+        self.warden.clear();
+    }
+
+    /// The device looks for its ends, which moves the plant and cannot be stopped.
+    ///
+    /// # Errors
+    /// When the device is not ready for it.
+    pub fn home(&mut self, now: Seconds) -> Result<(), NotArmed> {
+        if self.stage != Stage::Ready || self.warden.standing() == Standing::Armed {
+            return Err(NotArmed::NotReady);
+        }
+        // A command that is held would come back when homing ends; states say that it is 0.
+        if self.warden.latest().is_none_or(|seen| seen.held.is_some_and(|held| held != 0)) {
+            return Err(NotArmed::Moving);
+        }
+        self.wants_home = true;
+        self.since = now;
+        Ok(())
+    }
+
+    /// Homing takes the place of a state's command: two different orders between two states
+    /// would be mixed up by the board.
+    fn begin_homing(&mut self, now: Seconds) {
+        self.write(&Order::Home);
+        self.wants_home = false;
+        self.stage = Stage::Homing;
+        self.since = now;
+        self.is_homed = false;
+        self.owes = false;
+    }
+
+    /// What is to be written to the port now.
+    pub fn take_output(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.out)
+    }
+
+    /// How far the device has come.
+    #[must_use]
+    pub const fn stage(&self) -> &Stage {
+        &self.stage
+    }
+
+    /// What the guard allows.
+    #[must_use]
+    pub const fn standing(&self) -> Standing {
+        self.warden.standing()
+    }
+
+    /// Whether the ends of the track are known.
+    #[must_use]
+    pub const fn is_homed(&self) -> bool {
+        self.is_homed
+    }
+
+    /// Whether the motor is known to be off after a stop.
+    #[must_use]
+    pub const fn stopped(&self) -> Stopped {
+        self.stopped
+    }
+
+    /// The latest state, and when it came.
+    #[must_use]
+    pub fn latest(&self) -> Option<(State, Seconds)> {
+        self.warden.latest().map(|seen| (seen.state, seen.at))
+    }
+
+    /// What became of the bytes so far.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.codec.counts()
+    }
+
+    fn hear(&mut self, message: Message, now: Seconds) {
+        match message {
+            Message::State(frame) => self.see(&frame, now),
+            Message::Homed(_) if self.stage == Stage::Homing => {
+                self.is_homed = true;
+                self.ready(now);
+            }
+            Message::NotHomed if self.stage == Stage::Homing => self.ready(now),
+            Message::Config(told) if self.awaits(Awaits::Identity) => {
+                if config(&self.params).is_taken(&told) {
+                    self.next_step(now);
+                } else {
+                    self.close(
+                        now,
+                        "the board did not take its configuration: switch it off and on",
+                    );
+                }
+            }
+            Message::Hello(_) if self.awaits(Awaits::Identity) => self.next_step(now),
+            // A device that says hello in the middle has started anew.
+            Message::Hello(_) if self.stage == Stage::Ready => {
+                self.warden.latch(Fault::Reset);
+                self.is_homed = !self.params.homing;
+                self.stop(now);
+            }
+            Message::Ack(ack) if ack.outcome != Outcome::Done => self.refuse(ack.outcome, now),
+            _ => {}
+        }
+    }
+
+    /// A state came.
+    fn see(&mut self, frame: &StateFrame, now: Seconds) {
+        let Some((state, device)) = self.tracker.follow(frame) else {
+            self.close(
+                now,
+                "the device's states have no angle and position: two sensors are needed",
+            );
+            return;
+        };
+        match self.stage {
+            Stage::Opening if self.awaits(Awaits::States) => {
+                let is_sensible = frame.command == 0 && state.is_finite();
+                self.sensible = if is_sensible { self.sensible + 1 } else { 0 };
+                if self.sensible >= STATES {
+                    self.steps.clear();
+                    self.ready(now);
+                }
+            }
+            Stage::Ready => {
+                self.speed = state.get(1).copied().unwrap_or(0.0);
+                let held = Some(i64::from(frame.command));
+                let stopped = self.stopped_itself(frame);
+                self.warden.observe(Observation {
+                    state,
+                    at: now,
+                    device: Some(device),
+                    held,
+                    stopped,
+                });
+                self.confirm(frame.command, now);
+                self.owes = true;
+                self.heed(now);
+                if self.wants_home && self.owes && frame.command == 0 {
+                    self.begin_homing(now);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// That the device stopped following, and why. What it says before it first followed is
+    /// of the time before it was armed.
+    fn stopped_itself(&mut self, frame: &StateFrame) -> Option<&'static str> {
+        let flags = frame.flags?;
+        if self.warden.standing() != Standing::Armed {
+            return None;
+        }
+        let is_armed = flags.has(Flags::ARMED);
+        let followed = self.follows;
+        self.follows |= is_armed;
+        let why = stopped_by(flags).or((!is_armed).then_some("it takes no commands any more"));
+        why.filter(|_| followed)
+    }
+
+    /// The device holds `command`.
+    fn confirm(&mut self, command: i32, now: Seconds) {
+        let Some(since) = self.stopping else { return };
+        if command == 0 {
+            self.stopping = None;
+            self.stopped = Stopped::Confirmed;
+        } else if (now - since).0 > CONFIRMED_WITHIN * period(&self.params).0 {
+            self.stopped = Stopped::Unconfirmed;
+            // Once more; a copy of what may be waiting is harmless.
+            self.write_stops(now);
+            self.owes = false;
+        }
+    }
+
+    /// An armed plant that was just latched is stopped.
+    fn heed(&mut self, now: Seconds) {
+        let is_latched = matches!(self.warden.standing(), Standing::Latched(_));
+        if is_latched && self.stopping.is_none() && self.stopped == Stopped::No {
+            self.stop(now);
+        }
+        if let Some(since) = self.stopping
+            && (now - since).0 > 2.0 * CONFIRMED_WITHIN * period(&self.params).0
+        {
+            self.stopped = Stopped::Unconfirmed;
+        }
+    }
+
+    fn stop(&mut self, now: Seconds) {
+        // The first thing that a greeting says is that the motor stops; more would only get in
+        // its way.
+        if self.stage == Stage::Opening {
+            return;
+        }
+        self.wants_home = false;
+        self.write_stops(now);
+        self.warden.sent(0);
+        self.stopping = Some(now);
+        self.stopped = Stopped::Told;
+        self.owes = false;
+        self.wanted = None;
+    }
+
+    /// A burst of stops, if one is not the last word already: more would fill the board's buffer.
+    fn write_stops(&mut self, now: Seconds) {
+        if self.burst.is_none_or(|at| now - at >= SPACING) {
+            // Whatever else waits would only come before it.
+            self.out.clear();
+            self.write(&Order::Stop);
+            self.burst = Some(now);
+        }
+    }
+
+    fn refuse(&mut self, outcome: Outcome, now: Seconds) {
+        match self.stage {
+            Stage::Opening => self.close(now, &outcome.to_string()),
+            Stage::Homing => self.ready(now),
+            // Only what arms matters: of anything else the states tell.
+            Stage::Ready if self.warden.standing() == Standing::Armed => self.disarm(now),
+            _ => {}
+        }
+    }
+
+    fn ready(&mut self, now: Seconds) {
+        self.stage = Stage::Ready;
+        self.warden.forget();
+        self.tracker.forget();
+        self.since = now;
+        // Homing leaves the old command behind.
+        self.stop(now);
+    }
+
+    fn close(&mut self, now: Seconds, why: &str) {
+        self.warden.disarm();
+        self.stage = Stage::Closed(why.to_owned());
+        self.stop(now);
+        self.steps.clear();
+    }
+
+    fn awaits(&self, what: Awaits) -> bool {
+        self.stage == Stage::Opening && self.steps.front().is_some_and(|step| step.awaits == what)
+    }
+
+    fn next_step(&mut self, now: Seconds) {
+        self.steps.pop_front();
+        self.asked = None;
+        self.due = now + SPACING;
+    }
+
+    /// Goes on with the opening: writes what is due, and gives up on what does not come.
+    fn open(&mut self, now: Seconds) {
+        let Some(step) = self.steps.front().copied() else { return };
+        match self.asked {
+            None if now >= self.due => {
+                self.write(&step.order);
+                self.asked = Some(now);
+            }
+            None => {}
+            Some(_) if step.awaits == Awaits::Time => self.next_step(now),
+            Some(at) if now - at > self.patience() => self.close(now, SILENT),
+            Some(_) => {}
+        }
+    }
+
+    /// How long an answer may take: the states that are waited for need their time.
+    fn patience(&self) -> Seconds {
+        PATIENCE + period(&self.params) * f64::from(2 * STATES)
+    }
+
+    fn write(&mut self, order: &Order) {
+        self.burst = None;
+        // What cannot be said is refused by the profile's checks long before.
+        let _ = self.codec.encode(order, &mut self.out);
+    }
+}
+
+/// Why the motor stays off.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NotArmed {
+    /// No device, or one that is busy.
+    #[error("the device is not ready")]
+    NotReady,
+    /// It does not know its ends.
+    #[error("the device is not homed: home it first")]
+    NotHomed,
+    /// Its motor is on.
+    #[error("the motor is not off yet")]
+    Moving,
+    /// Something is wrong.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+}
+
+/// That a device stopped by itself, and why.
+fn stopped_by(flags: Flags) -> Option<&'static str> {
+    [
+        (Flags::WATCHDOG, "its watchdog missed our commands"),
+        (Flags::ESTOP, "its emergency stop is pressed"),
+        (Flags::SENSOR_FAULT, "a sensor does not answer"),
+    ]
+    .into_iter()
+    .find_map(|(flag, why)| flags.has(flag).then_some(why))
+}
+
+fn period(params: &Params) -> Seconds {
+    Seconds(f64::from(params.period_ms) * 1e-3)
+}
+
+fn config(params: &Params) -> Config {
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a reading, which the firmware keeps as f32"
+    )]
+    let angle_hanging = params.scales.angle.hanging as f32;
+    let firmware = (params.format == Format::Sensorsini31).then_some(FirmwareConfig {
+        sync: true,
+        angle_hanging,
+        average: params.average,
+        correct_dynamics: false,
+    });
+    Config { period_ms: params.period_ms, firmware }
+}
+
+/// How a device is opened: the motor first.
+fn steps(params: &Params) -> Vec<Step> {
+    let step = |order, awaits| Step { order, awaits };
+    let configure = Order::Configure(config(params));
+    match params.format {
+        Format::Sensorsini31 => vec![
+            step(Order::Stop, Awaits::Time),
+            step(Order::Disarm, Awaits::Time),
+            step(Order::Stream(false), Awaits::Time),
+            step(configure, Awaits::Time),
+            step(Order::Query, Awaits::Identity),
+            step(Order::Stream(true), Awaits::States),
+        ],
+        Format::Cobs1 => vec![
+            step(Order::Stop, Awaits::Time),
+            step(Order::Query, Awaits::Identity),
+            step(configure, Awaits::Time),
+            step(Order::Stream(true), Awaits::States),
+        ],
+    }
+}
+
+#[cfg(test)]
+#[path = "driver_tests.rs"]
+mod tests;
