@@ -83,6 +83,15 @@ pub trait Check {
     fn check(&self, checker: &mut Checker<'_>);
 }
 
+/// What is not there has no faults.
+impl<T: Check> Check for Option<T> {
+    fn check(&self, checker: &mut Checker<'_>) {
+        if let Some(parameters) = self {
+            parameters.check(checker);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -245,8 +245,11 @@ docs/SERIAL-PROTOCOL.md has the faults and what a host must never do. Ctrl-C end
 #[derive(Args, Debug)]
 #[command(after_help = EMULATE_EXAMPLES)]
 pub struct Emulate {
-    /// physical-cart-pole, cobs-cart-pole, or the path of a device in RON (profiles/devices/).
+    /// A profile with a device: physical-cart-pole, cobs-cart-pole, or a path.
     pub profile: String,
+    /// Change a value of the profile, such as `backend.emulated.motor.delay_s=0.005`.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_value)]
+    pub set: Vec<(String, String)>,
     /// Make a link to the port here, which stays when the port gets another name.
     #[arg(long, value_name = "PATH")]
     pub port_link: Option<PathBuf>,

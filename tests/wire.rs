@@ -6,8 +6,8 @@ use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::Path;
 
-use coadapt::backend::emulator::Params;
 use coadapt::backend::emulator::faults::Faults;
+use coadapt::backend::emulator::rig;
 use coadapt::backend::wire::cobs1::frames as cobs1;
 use coadapt::backend::wire::sensorsini31::frames::{Reply, Request, raw_angles};
 use coadapt::backend::wire::{
@@ -15,6 +15,7 @@ use coadapt::backend::wire::{
     Refusal, StateFrame, sensorsini31,
 };
 use coadapt::check::{Check, Checker};
+use coadapt::profile::Document;
 use serde_json::Value;
 
 /// A row of `tests/data/wire/sensorsini31.csv`.
@@ -325,17 +326,10 @@ fn the_fault_file_of_the_document_is_one() {
 
 #[test]
 fn the_devices_that_come_along_are_right_and_the_robot_is_the_default() {
-    let options =
-        ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
     let [robot, board] = ["physical-cart-pole", "cobs-cart-pole"].map(|name| {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("profiles/devices").join(name);
-        let text = fs::read_to_string(path.with_extension("ron")).unwrap();
-        let params: Params = options.from_str(&text).unwrap();
-        let mut wrong = Vec::new();
-        params.check(&mut Checker::new(&mut wrong));
-        assert_eq!(wrong, Vec::new(), "{name}");
-        params
+        let nowhere = Path::new("no such folder");
+        Document::find(name, nowhere).unwrap().read().unwrap().backend.unwrap()
     });
-    assert_eq!(robot, Params::default());
-    assert_eq!(board.format, Format::Cobs1);
+    assert_eq!(robot.emulated, rig::Params::default());
+    assert_eq!((robot.format, board.format), (Format::Sensorsini31, Format::Cobs1));
 }

@@ -19,11 +19,8 @@ pub mod trace;
 
 use std::collections::VecDeque;
 
-use serde::{Deserialize, Serialize};
-
 use super::wire::cobs1::frames::{Deframer, Piece};
-use super::wire::{Format, cobs1, sensorsini31};
-use crate::check::{Check, Checker};
+use super::wire::{Baud, Format, cobs1, sensorsini31};
 use crate::random::{Place, Purpose, stream};
 use crate::signal::{Seconds, State};
 use faults::{Fault, Faults};
@@ -37,8 +34,7 @@ use trace::{Entry, Event, Kind, Trace, Written};
 const TURN_US: u64 = 50;
 
 /// An emulated device's parameters.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Params {
     /// What it speaks, and with that which board it is.
     pub format: Format,
@@ -48,24 +44,6 @@ pub struct Params {
     pub rig: rig::Params,
     /// What the device's clock shows at the start, µs; it wraps at 2³².
     pub clock_us: u32,
-}
-
-/// Bits a second on the wire.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Baud(pub u32);
-
-impl Default for Baud {
-    fn default() -> Self {
-        Self(230_400)
-    }
-}
-
-impl Check for Params {
-    fn check(&self, c: &mut Checker<'_>) {
-        c.count("baud", self.baud.0, 9600..=4_000_000);
-        self.rig.check(&mut c.section("rig"));
-    }
 }
 
 /// A board: what its main loop does.

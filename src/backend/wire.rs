@@ -18,6 +18,7 @@ pub mod sensorsini31;
 
 use serde::{Deserialize, Serialize};
 
+use crate::check::{Check, Checker};
 use crate::signal::Seconds;
 
 /// A wire format.
@@ -416,6 +417,23 @@ pub enum Unsendable {
     /// The device would refuse it.
     #[error("a watchdog of {0} ms: give at most {most} ms, or 0 for five periods", most = cobs1::LONGEST_WATCHDOG_MS)]
     Watchdog(u16),
+}
+
+/// Bits a second on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Baud(pub u32);
+
+impl Default for Baud {
+    fn default() -> Self {
+        Self(230_400)
+    }
+}
+
+impl Check for Baud {
+    fn check(&self, c: &mut Checker<'_>) {
+        c.count("baud", self.0, 9600..=4_000_000);
+    }
 }
 
 /// How long `bytes` bytes take at `baud` with 8 data bits, no parity and 1 stop bit.

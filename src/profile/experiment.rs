@@ -136,6 +136,12 @@ impl Experiment {
         }
     }
 
+    /// Whether its plant is a cart-pole.
+    #[must_use]
+    pub const fn is_cart_pole(&self) -> bool {
+        matches!(self, Self::Balance { .. } | Self::SwingUp { .. })
+    }
+
     /// The names of the state's numbers.
     #[must_use]
     pub const fn columns(&self) -> &'static [&'static str] {

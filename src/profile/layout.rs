@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use super::experiment::Experiment;
 use super::{Screen, WantedMode};
+use crate::backend::serial;
 use crate::check::{Check, Checker};
 use crate::{learner, operator, session, sharing, teaching};
 
@@ -126,6 +127,19 @@ macro_rules! sections {
                         &format!("regions of this task: {}", regions.join(", ")),
                     );
                 }
+                c.demand(
+                    self.backend.is_none() || self.experiment.is_cart_pole(),
+                    "backend",
+                    "a real plant",
+                    "None: only the cart-pole's tasks have one",
+                );
+                c.demand(
+                    self.backend.is_none()
+                        || (self.tick_ms.fract() == 0.0 && (2.0..=50.0).contains(&self.tick_ms)),
+                    "tick_ms",
+                    self.tick_ms,
+                    "a whole number of 2 to 50 with a real plant, whose states come each",
+                );
                 $(self.$section.check(&mut c.section(stringify!($section)));)*
             }
         }
@@ -143,6 +157,8 @@ sections! {
     session: session::plan::Params,
     /// Hands on a device.
     operator: operator::Params,
+    /// The real plant, where there is one.
+    backend: Option<serial::Params>,
     /// What is drawn, and how often.
     screen: Screen,
 }

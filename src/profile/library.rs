@@ -7,11 +7,13 @@ use std::path::{Path, PathBuf};
 use super::reading::nearest;
 
 /// The profiles built into the program.
-const BUILT_IN: [(&str, &str); 8] = [
+const BUILT_IN: [(&str, &str); 10] = [
     ("balance", include_str!("../../profiles/balance.ron")),
     ("balance-modern", include_str!("../../profiles/balance-modern.ron")),
+    ("cobs-cart-pole", include_str!("../../profiles/cobs-cart-pole.ron")),
     ("mountain-car", include_str!("../../profiles/mountain-car.ron")),
     ("mountain-car-modern", include_str!("../../profiles/mountain-car-modern.ron")),
+    ("physical-cart-pole", include_str!("../../profiles/physical-cart-pole.ron")),
     ("speed-up", include_str!("../../profiles/speed-up.ron")),
     ("speed-up-modern", include_str!("../../profiles/speed-up-modern.ron")),
     ("swing-up", include_str!("../../profiles/swing-up.ron")),

@@ -18,13 +18,9 @@ use crate::backend::emulator::{Emulator, Params};
 use crate::check::{Check, Checker};
 use crate::cli;
 use crate::clock::{Clock, WallClock};
+use crate::profile::Order;
 use crate::signal::Seconds;
 
-/// The devices that can be emulated by name.
-const BUILT_IN: [(&str, &str); 2] = [
-    ("physical-cart-pole", include_str!("../../profiles/devices/physical-cart-pole.ron")),
-    ("cobs-cart-pole", include_str!("../../profiles/devices/cobs-cart-pole.ron")),
-];
 /// Bytes are passed on at least this often.
 const TURN: Seconds = Seconds(0.001);
 /// When the machine was busy for longer than this, the device's time stood still: a burst of
@@ -33,7 +29,7 @@ const STALL: Seconds = Seconds(0.01);
 
 /// Emulates until a signal comes, or the reader of the trace is gone.
 pub(super) fn emulate(words: &cli::Emulate) -> Result<ExitCode, RunError> {
-    let params = device(&words.profile)?;
+    let params = device(words)?;
     let faults = match &words.faults {
         Some(file) => load::<Faults>(file)?,
         None => Faults::default(),
@@ -245,20 +241,19 @@ fn json(line: &impl Serialize) -> Result<String, RunError> {
         .map_err(|error| RunError::Failed(format!("the trace has no JSON: {error}")))
 }
 
-/// The device with this name, or in this file.
-fn device(name: &str) -> Result<Params, RunError> {
-    if let Some((_, text)) = BUILT_IN.iter().find(|(known, _)| *known == name) {
-        return parse(text, name);
-    }
-    let path = Path::new(name);
-    if path.exists() {
-        return load(path);
-    }
-    let known: Vec<&str> = BUILT_IN.iter().map(|(known, _)| *known).collect();
-    Err(RunError::Usage(format!(
-        "no device {name}: give {} or the path of a device in RON",
-        known.join(", ")
-    )))
+/// The device of the order's profile.
+fn device(words: &cli::Emulate) -> Result<Params, RunError> {
+    let order =
+        Order { profile: words.profile.clone(), sets: words.set.clone(), ..Order::default() };
+    let profile = super::session::profile_of(&order)?;
+    let Some(plant) = &profile.backend else {
+        return Err(RunError::Usage(format!(
+            "the profile {} has no section `backend`, and so no device: physical-cart-pole and \
+             cobs-cart-pole have one",
+            words.profile
+        )));
+    };
+    Ok(Params { format: plant.format, baud: plant.baud, rig: plant.emulated.clone(), clock_us: 0 })
 }
 
 fn load<T: DeserializeOwned + Check>(path: &Path) -> Result<T, RunError> {

@@ -11,66 +11,12 @@
 //!    └──── lost ───────┴──────────────────────────────────┘  └── arm: the warden's affair
 //! ```
 
-use std::collections::VecDeque;
-
-use serde::{Deserialize, Serialize};
-
-use super::scales::{self, Tracker};
-use crate::backend::safety::warden::{self, Fault, Observation, Standing, Wanted, Warden};
-use crate::backend::wire::{
-    Codec, Config, Counts, FirmwareConfig, Flags, Format, Message, Order, Outcome, StateFrame,
-};
-use crate::check::{Check, Checker};
+use super::Params;
+use super::greeting::{Greeting, Progress, SPACING};
+use super::scales::Tracker;
+use crate::backend::safety::warden::{Fault, Observation, Standing, Wanted, Warden};
+use crate::backend::wire::{Codec, Counts, Flags, Format, Message, Order, Outcome, StateFrame};
 use crate::signal::{Seconds, State};
-
-/// A device's parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Params {
-    /// What it speaks.
-    pub format: Format,
-    /// The time between two states, ms.
-    pub period_ms: u16,
-    /// [`Format::Sensorsini31`]: the number of readings whose median is the angle.
-    pub average: u16,
-    /// [`Format::Cobs1`]: the device stops by itself when no command came for so long, ms; 0:
-    /// five periods.
-    pub watchdog_ms: u16,
-    /// How long the board starts after its port was opened, s.
-    pub start_s: f64,
-    /// Whether it must find its ends before it may be armed.
-    pub homing: bool,
-    /// From counts to the plant, and back.
-    pub scales: scales::Params,
-    /// The plant's limits.
-    pub safety: warden::Params,
-}
-
-impl Default for Params {
-    fn default() -> Self {
-        Self {
-            format: Format::default(),
-            period_ms: 20,
-            average: 1,
-            watchdog_ms: 0,
-            start_s: 0.0,
-            homing: true,
-            scales: scales::Params::default(),
-            safety: warden::Params::default(),
-        }
-    }
-}
-
-impl Check for Params {
-    fn check(&self, c: &mut Checker<'_>) {
-        c.count("period_ms", self.period_ms.into(), 2..=50);
-        c.count("average", self.average.into(), 1..=32);
-        c.count("watchdog_ms", self.watchdog_ms.into(), 0..=250);
-        c.range("start_s", self.start_s, 0.0..=10.0);
-        self.scales.check(&mut c.section("scales"));
-        self.safety.check(&mut c.section("safety"));
-    }
-}
 
 /// How far a device has come.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,38 +31,11 @@ pub enum Stage {
     Homing,
 }
 
-/// What a step of the opening waits for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Awaits {
-    /// Nothing but its time.
-    Time,
-    /// The device's configuration or name.
-    Identity,
-    /// So many states that make sense.
-    States,
-}
-
-/// A step of the opening: what is written, and what must come before the next one.
-#[derive(Clone, Copy, Debug)]
-struct Step {
-    order: Order,
-    awaits: Awaits,
-}
-
-/// The least time between two different orders to a device that sends no states.
-const SPACING: Seconds = Seconds(0.005);
-/// How long an answer may take,
-const PATIENCE: Seconds = Seconds(0.5);
-/// and homing.
+/// How long homing may take.
 const HOMING: Seconds = Seconds(30.0);
 /// What is said of homing that takes longer.
 const STUCK: &str = "homing does not end: switch the motor's supply off, then look whether the \
     cart is stuck";
-/// States that must make sense before a device counts as ready.
-const STATES: u32 = 10;
-/// What is said of a device that does not answer.
-const SILENT: &str = "the device does not answer: look at its power, its cable, its baud rate and \
-    its firmware";
 /// A stop that the device has not confirmed after so many periods is said to be unconfirmed.
 const CONFIRMED_WITHIN: f64 = 3.0;
 
@@ -134,23 +53,23 @@ pub enum Stopped {
 }
 
 /// The host's side of one device.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "four facts that have nothing to do with another"
+)]
 pub struct Driver {
     params: Params,
+    period: Seconds,
     limit: f64,
     codec: Box<dyn Codec>,
     warden: Warden,
     tracker: Tracker,
     stage: Stage,
-    steps: VecDeque<Step>,
+    greeting: Greeting,
     /// When the present stage began.
     since: Seconds,
-    /// When the next step of the opening is due,
-    due: Seconds,
-    /// and when its order was written.
-    asked: Option<Seconds>,
     /// The device has said that it follows commands.
     follows: bool,
-    sensible: u32,
     is_homed: bool,
     wants_home: bool,
     wanted: Option<Wanted>,
@@ -167,23 +86,21 @@ pub struct Driver {
 }
 
 impl Driver {
-    /// A driver for a device that is not there yet, of a plant with actions up to ± `limit`.
+    /// A driver for a device that is not there yet, of a plant with actions up to ± `limit`; it
+    /// is to send a state each `period`.
     #[must_use]
-    pub fn new(params: &Params, limit: f64) -> Self {
-        let period = period(params);
+    pub fn new(params: &Params, period: Seconds, limit: f64) -> Self {
         Self {
             params: params.clone(),
+            period,
             limit,
             codec: params.format.codec(),
             warden: Warden::new(params.safety.clone(), limit, period),
             tracker: Tracker::new(params.scales.clone(), period),
             stage: Stage::Closed("not opened yet".to_owned()),
-            steps: VecDeque::new(),
+            greeting: Greeting::default(),
             since: Seconds(0.0),
-            due: Seconds(0.0),
-            asked: None,
             follows: false,
-            sensible: 0,
             is_homed: false,
             wants_home: false,
             wanted: None,
@@ -204,14 +121,11 @@ impl Driver {
         self.tracker.forget();
         self.stage = Stage::Opening;
         self.is_homed = !self.params.homing;
-        self.sensible = 0;
         self.owes = false;
         self.wants_home = false;
         self.wanted = None;
-        self.steps = steps(&self.params).into();
+        self.greeting = Greeting::begin(&self.params, self.period, now);
         self.since = now;
-        self.due = now + Seconds(self.params.start_s);
-        self.asked = None;
         self.stopped = Stopped::No;
         self.stopping = None;
         self.burst = None;
@@ -221,7 +135,6 @@ impl Driver {
     pub fn lost(&mut self, why: impl Into<String>) {
         let was_armed = self.warden.standing() == Standing::Armed;
         self.stage = Stage::Closed(why.into());
-        self.steps.clear();
         self.out.clear();
         self.owes = false;
         self.is_homed = false;
@@ -256,13 +169,12 @@ impl Driver {
     /// Time goes on to `now`.
     pub fn pass(&mut self, now: Seconds) {
         match self.stage {
-            Stage::Closed(_) => return,
-            Stage::Opening => self.open(now),
             Stage::Homing if (now - self.since).0 > HOMING.0 => {
                 self.close(now, STUCK);
             }
             // Homing is silent.
-            Stage::Homing => return,
+            Stage::Closed(_) | Stage::Homing => return,
+            Stage::Opening => self.greet(now),
             Stage::Ready => self.warden.pass(now),
         }
         self.heed(now);
@@ -414,17 +326,10 @@ impl Driver {
                 self.ready(now);
             }
             Message::NotHomed if self.stage == Stage::Homing => self.ready(now),
-            Message::Config(told) if self.awaits(Awaits::Identity) => {
-                if config(&self.params).is_taken(&told) {
-                    self.next_step(now);
-                } else {
-                    self.close(
-                        now,
-                        "the board did not take its configuration: switch it off and on",
-                    );
-                }
+            Message::Config(told) if self.stage == Stage::Opening => {
+                self.greeting.configured(&told, now);
             }
-            Message::Hello(_) if self.awaits(Awaits::Identity) => self.next_step(now),
+            Message::Hello(_) if self.stage == Stage::Opening => self.greeting.identified(now),
             // A device that says hello in the middle has started anew.
             Message::Hello(_) if self.stage == Stage::Ready => {
                 self.warden.latch(Fault::Reset);
@@ -446,13 +351,9 @@ impl Driver {
             return;
         };
         match self.stage {
-            Stage::Opening if self.awaits(Awaits::States) => {
-                let is_sensible = frame.command == 0 && state.is_finite();
-                self.sensible = if is_sensible { self.sensible + 1 } else { 0 };
-                if self.sensible >= STATES {
-                    self.steps.clear();
-                    self.ready(now);
-                }
+            Stage::Opening => {
+                self.greeting.saw(frame.command == 0 && state.is_finite());
+                self.greet(now);
             }
             Stage::Ready => {
                 self.speed = state.get(1).copied().unwrap_or(0.0);
@@ -496,7 +397,7 @@ impl Driver {
         if command == 0 {
             self.stopping = None;
             self.stopped = Stopped::Confirmed;
-        } else if (now - since).0 > CONFIRMED_WITHIN * period(&self.params).0 {
+        } else if (now - since).0 > CONFIRMED_WITHIN * self.period.0 {
             self.stopped = Stopped::Unconfirmed;
             // Once more; a copy of what may be waiting is harmless.
             self.write_stops(now);
@@ -511,7 +412,7 @@ impl Driver {
             self.stop(now);
         }
         if let Some(since) = self.stopping
-            && (now - since).0 > 2.0 * CONFIRMED_WITHIN * period(&self.params).0
+            && (now - since).0 > 2.0 * CONFIRMED_WITHIN * self.period.0
         {
             self.stopped = Stopped::Unconfirmed;
         }
@@ -565,37 +466,16 @@ impl Driver {
         self.warden.disarm();
         self.stage = Stage::Closed(why.to_owned());
         self.stop(now);
-        self.steps.clear();
     }
 
-    fn awaits(&self, what: Awaits) -> bool {
-        self.stage == Stage::Opening && self.steps.front().is_some_and(|step| step.awaits == what)
-    }
-
-    fn next_step(&mut self, now: Seconds) {
-        self.steps.pop_front();
-        self.asked = None;
-        self.due = now + SPACING;
-    }
-
-    /// Goes on with the opening: writes what is due, and gives up on what does not come.
-    fn open(&mut self, now: Seconds) {
-        let Some(step) = self.steps.front().copied() else { return };
-        match self.asked {
-            None if now >= self.due => {
-                self.write(&step.order);
-                self.asked = Some(now);
-            }
-            None => {}
-            Some(_) if step.awaits == Awaits::Time => self.next_step(now),
-            Some(at) if now - at > self.patience() => self.close(now, SILENT),
-            Some(_) => {}
+    /// Goes on with the greeting.
+    fn greet(&mut self, now: Seconds) {
+        match self.greeting.pass(now) {
+            Progress::Waits => {}
+            Progress::Says(order) => self.write(&order),
+            Progress::Refused(why) => self.close(now, why),
+            Progress::Done => self.ready(now),
         }
-    }
-
-    /// How long an answer may take: the states that are waited for need their time.
-    fn patience(&self) -> Seconds {
-        PATIENCE + period(&self.params) * f64::from(2 * STATES)
     }
 
     fn write(&mut self, order: &Order) {
@@ -631,47 +511,6 @@ fn stopped_by(flags: Flags) -> Option<&'static str> {
     ]
     .into_iter()
     .find_map(|(flag, why)| flags.has(flag).then_some(why))
-}
-
-fn period(params: &Params) -> Seconds {
-    Seconds(f64::from(params.period_ms) * 1e-3)
-}
-
-fn config(params: &Params) -> Config {
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "a reading, which the firmware keeps as f32"
-    )]
-    let angle_hanging = params.scales.angle.hanging as f32;
-    let firmware = (params.format == Format::Sensorsini31).then_some(FirmwareConfig {
-        sync: true,
-        angle_hanging,
-        average: params.average,
-        correct_dynamics: false,
-    });
-    Config { period_ms: params.period_ms, firmware }
-}
-
-/// How a device is opened: the motor first.
-fn steps(params: &Params) -> Vec<Step> {
-    let step = |order, awaits| Step { order, awaits };
-    let configure = Order::Configure(config(params));
-    match params.format {
-        Format::Sensorsini31 => vec![
-            step(Order::Stop, Awaits::Time),
-            step(Order::Disarm, Awaits::Time),
-            step(Order::Stream(false), Awaits::Time),
-            step(configure, Awaits::Time),
-            step(Order::Query, Awaits::Identity),
-            step(Order::Stream(true), Awaits::States),
-        ],
-        Format::Cobs1 => vec![
-            step(Order::Stop, Awaits::Time),
-            step(Order::Query, Awaits::Identity),
-            step(configure, Awaits::Time),
-            step(Order::Stream(true), Awaits::States),
-        ],
-    }
 }
 
 #[cfg(test)]

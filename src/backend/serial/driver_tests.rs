@@ -2,11 +2,14 @@ use super::*;
 use crate::backend::emulator::faults::{Fault as Broken, Faults, Noise, Timed};
 use crate::backend::emulator::rig::Sensor;
 use crate::backend::emulator::{self, Emulator};
+use crate::backend::serial::scales;
 use crate::random::{Place, Purpose, stream};
 use rand::RngExt;
 
 /// The largest action of the emulated robot, N.
 const LIMIT: f64 = 1.77;
+/// A state comes each, s.
+const PERIOD: Seconds = Seconds(0.02);
 /// How often whoever owns the port moves bytes.
 const STEP: f64 = 0.001;
 
@@ -29,7 +32,7 @@ struct Bench {
 impl Bench {
     fn new(format: Format, faults: &Faults, seed: u64) -> Self {
         let device = emulator::Params { format, ..emulator::Params::default() };
-        let mut driver = Driver::new(&params(format), LIMIT);
+        let mut driver = Driver::new(&params(format), PERIOD, LIMIT);
         driver.opened(Seconds(0.0));
         let device = Emulator::new(&device, faults, seed);
         Self { driver, device, now: Seconds(0.0), wish: None, was_plugged: true }
@@ -172,7 +175,7 @@ fn another_firmware_is_refused_by_name() {
         let Stage::Closed(why) = bench.driver.stage() else { panic!("{format:?}") };
         assert!(why.contains(words), "{why}");
     }
-    let mut silent = Driver::new(&params(Format::Cobs1), LIMIT);
+    let mut silent = Driver::new(&params(Format::Cobs1), PERIOD, LIMIT);
     silent.opened(Seconds(0.0));
     (0..3000_u32).for_each(|k| silent.pass(Seconds(f64::from(k) * STEP)));
     assert!(matches!(silent.stage(), Stage::Closed(why) if why.contains("does not answer")));

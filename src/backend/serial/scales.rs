@@ -141,7 +141,7 @@ impl Params {
         let Motor { full_scale, most, gain, friction_forward, friction_backward, invert } =
             self.motor;
         // What is no number moves nothing.
-        if !(part.abs() > 0.0) {
+        if part == 0.0 || part.is_nan() {
             return 0;
         }
         let friction = if speed > 0.0 {

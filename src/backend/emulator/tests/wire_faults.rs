@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::check::{Check, Checker};
 
 fn run(faults: &Faults, time: f64) -> Lab {
     let mut lab = Lab::with(&Params::default(), faults);
@@ -123,7 +124,7 @@ fn a_fault_file_is_read_and_checked() {
         .check(&mut Checker::new(&mut wrong));
     assert_eq!(wrong[0].key, "to_host.flip");
     let mut wrong = Vec::new();
-    Params::default().check(&mut Checker::new(&mut wrong));
+    rig::Params::default().check(&mut Checker::new(&mut wrong));
     assert_eq!(wrong, []);
 }
 
