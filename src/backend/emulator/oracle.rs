@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::faults::Fault;
 use super::trace::{Entry, Event, Kind, Written};
 use crate::backend::wire::on_the_wire;
 use crate::backend::wire::sensorsini31::frames::{Request, SET_PID_CONFIG};
@@ -113,9 +114,10 @@ impl Oracle {
                     Event::Delivered { message } => self.delivered(*message),
                     Event::HomingBegan => self.is_homing = true,
                     Event::HomingEnded { .. } => self.is_homing = false,
-                    Event::Started => {
-                        *self =
-                            Self { through: self.through, ..Self::new(self.full_scale, self.baud) }
+                    // Whoever comes after a pulled cable begins anew, too.
+                    Event::Started | Event::Fault { fault: Fault::Unplug { .. } } => {
+                        let fresh = Self::new(self.full_scale, self.baud);
+                        *self = Self { through: self.through, ..fresh };
                     }
                     _ => {}
                 }

@@ -12,7 +12,7 @@
 //! ```
 
 use super::Params;
-use super::greeting::{Greeting, Progress, SPACING};
+use super::greeting::{Greeting, Progress};
 use super::scales::Tracker;
 use crate::backend::safety::warden::{Fault, Observation, Standing, Wanted, Warden};
 use crate::backend::wire::{Codec, Counts, Flags, Format, Message, Order, Outcome, StateFrame};
@@ -31,6 +31,8 @@ pub enum Stage {
     Homing,
 }
 
+/// Within this time a burst of stops is enough.
+const BURST: Seconds = Seconds(0.005);
 /// How long homing may take.
 const HOMING: Seconds = Seconds(30.0);
 /// What is said of homing that takes longer.
@@ -117,6 +119,7 @@ impl Driver {
     /// The port is open at `now`: the motor is stopped first, then the device is greeted.
     pub fn opened(&mut self, now: Seconds) {
         self.codec.restart();
+        self.out.clear();
         self.warden.forget();
         self.tracker.forget();
         self.stage = Stage::Opening;
@@ -435,7 +438,7 @@ impl Driver {
 
     /// A burst of stops, if one is not the last word already: more would fill the board's buffer.
     fn write_stops(&mut self, now: Seconds) {
-        if self.burst.is_none_or(|at| now - at >= SPACING) {
+        if self.burst.is_none_or(|at| now - at >= BURST) {
             // Whatever else waits would only come before it.
             self.out.clear();
             self.write(&Order::Stop);

@@ -7,8 +7,9 @@ use super::Params;
 use crate::backend::wire::{Config, FirmwareConfig, Format, Order};
 use crate::signal::Seconds;
 
-/// The least time between two different orders to a device that sends no states.
-pub const SPACING: Seconds = Seconds(0.005);
+/// The time between two orders. A board that still streams from before gets no two of them between
+/// two states: its longest period is 50 ms.
+const SPACING: Seconds = Seconds(0.06);
 /// How long an answer may take.
 const PATIENCE: Seconds = Seconds(0.5);
 /// States in a row that must make sense.
@@ -56,6 +57,9 @@ pub struct Greeting {
     due: Seconds,
     /// and when it was written.
     asked: Option<Seconds>,
+    /// A state came since the last order, of a board that streams from before; `None`: it does
+    /// not, as far as is known.
+    state_came: Option<bool>,
     /// States in a row that made sense.
     sensible: u32,
     refused: Option<&'static str>,
@@ -85,8 +89,12 @@ impl Greeting {
         let Some(step) = self.steps.front().copied() else { return Progress::Done };
         match self.asked {
             None if now < self.due => Progress::Waits,
+            // One order after each state of a board that streams, unless its states stay away.
+            None if self.state_came == Some(false) && now - self.due < PATIENCE => Progress::Waits,
             None => {
                 self.asked = Some(now);
+                let goes_on = step.order != Order::Stream(false);
+                self.state_came = self.state_came.filter(|_| goes_on).map(|_| false);
                 Progress::Says(step.order)
             }
             Some(_) if step.awaits == Awaits::Time => {
@@ -119,6 +127,7 @@ impl Greeting {
 
     /// The device sent a state, which made sense or did not.
     pub fn saw(&mut self, makes_sense: bool) {
+        self.state_came = Some(true);
         if self.awaits(Awaits::States) {
             self.sensible = if makes_sense { self.sensible + 1 } else { 0 };
             if self.sensible >= STATES {
