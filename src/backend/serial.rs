@@ -1,8 +1,11 @@
 //! The plant at the end of a serial line.
 
+pub mod address;
 pub mod driver;
 mod greeting;
 mod params;
+#[cfg(unix)]
+pub mod port;
 pub mod ports;
 pub mod scales;
 
