@@ -16,7 +16,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::check::{Check, Checker};
-use crate::signal::{Seconds, State};
+use crate::signal::{Seconds, State, wrapped};
 
 /// The limits of a real plant. Positions are those of the state's first number, angles of its
 /// third.
@@ -442,12 +442,6 @@ impl Warden {
 
 /// A pause of the caller that no scheduler explains.
 const CLOCK_JUMP: Seconds = Seconds(1.0);
-
-/// `angle` within half a turn of 0, rad.
-fn wrapped(angle: f64) -> f64 {
-    let turn = std::f64::consts::TAU;
-    angle - turn * (angle / turn).round()
-}
 
 #[cfg(test)]
 #[path = "warden_tests.rs"]
