@@ -225,7 +225,11 @@ impl Procedure {
         let has_zero = !self.params.homing || sight.is_homed;
         let needs_zero = matches!(
             self.stage,
-            Stage::MayPush | Stage::Steady { .. } | Stage::Push(_) | Stage::WhichWay | Stage::Limits
+            Stage::MayPush
+                | Stage::Steady { .. }
+                | Stage::Push(_)
+                | Stage::WhichWay
+                | Stage::Limits
         );
         if needs_zero && !has_zero {
             self.stage = Stage::Failed(Trouble::ZeroLost);
@@ -265,8 +269,7 @@ impl Procedure {
                 }
                 let hung = rest.mean();
                 let now = sight.now;
-                self.stage =
-                    Stage::Push(Push { since: now, now, hung, from: position, lag: None });
+                self.stage = Stage::Push(Push { since: now, now, hung, from: position, lag: None });
                 Wish::Drive(PUSH * self.about.limit)
             }
             Stage::Push(_) if !sight.is_armed => {
@@ -425,12 +428,15 @@ impl Procedure {
 
     fn limits(&self) -> String {
         let (soft, hard) = (self.params.safety.soft_limit_m, self.params.safety.hard_limit_m);
-        let rule = format!("From ±{soft:.3} m on the motor only pushes inward; ±{hard:.3} m stops it.");
+        let rule =
+            format!("From ±{soft:.3} m on the motor only pushes inward; ±{hard:.3} m stops it.");
         match self.about.half_track_m {
             Some(half) => {
                 format!("{rule}\nThe track ends at ±{half:.3} m: are both limits inside it?")
             }
-            None => format!("{rule}\nMeasure the track from its middle: are both limits inside it?"),
+            None => {
+                format!("{rule}\nMeasure the track from its middle: are both limits inside it?")
+            }
         }
     }
 }

@@ -155,7 +155,11 @@ fn comes_out_right(robot: Robot) {
     let went = lab.bench.device.state()[0] - lab.stood;
     assert!((0.005..0.06).contains(&went.abs()), "{robot:?}: {went}");
     let is_right = (went > 0.0) != robot.mirrored;
-    if is_right { lab.procedure.go_on() } else { lab.procedure.no() }
+    if is_right {
+        lab.procedure.go_on()
+    } else {
+        lab.procedure.no()
+    }
     assert_eq!(lab.step(), Step::Limits);
     assert_eq!(lab.procedure.result(), None);
     lab.procedure.go_on();
@@ -166,7 +170,11 @@ fn comes_out_right(robot: Robot) {
     let mut corrected = robot.params();
     found.apply(&mut corrected.scales);
     let mut bench = Bench::of(&corrected, Emulator::new(&robot.device(), &Faults::default(), 1));
-    if robot.homing { bench.home() } else { bench.go(1.5) }
+    if robot.homing {
+        bench.home()
+    } else {
+        bench.go(1.5)
+    }
     bench.driver.arm(bench.now).unwrap();
     bench.wish = Some(0.3 * LIMIT);
     bench.go(0.2);
@@ -189,8 +197,7 @@ fn a_robot_that_is_the_other_way_round_is_calibrated() {
         for (angle, position, motor_invert) in [(1, 1.0, false), (-1, -1.0, true), (1, -1.0, true)]
         {
             let usual = Robot::usual(Format::Sensorsini31);
-            let robot =
-                Robot { homing: false, angle, position, motor_invert, mirrored, ..usual };
+            let robot = Robot { homing: false, angle, position, motor_invert, mirrored, ..usual };
             comes_out_right(robot);
         }
     }

@@ -157,7 +157,9 @@ impl Centre {
         self.unrest = self.judge(state, dt);
         self.rests = if self.unrest.is_none() { self.rests + dt } else { Seconds(0.0) };
         let is_there = self.rests >= REST;
-        let action = if is_there { 0.0 } else { self.action(state) };
+        // What is no number moves nothing, and what is at rest is left alone.
+        let is_moved = !is_there && self.unrest != Some(Unrest::State);
+        let action = if is_moved { self.action(state) } else { 0.0 };
         Wish { action, is_there }
     }
 
@@ -201,8 +203,8 @@ impl Centre {
         let push = self.friction * (speed / CREEP).clamp(-1.0, 1.0);
         let force = self.servo * (speed - x_dot) + push;
         let most = self.params.most * self.limit;
-        // What is no number moves nothing.
-        if force.is_finite() { force.clamp(-most, most) } else { 0.0 }
+        // Of states beyond all measure.
+        if force.is_nan() { 0.0 } else { force.clamp(-most, most) }
     }
 }
 
@@ -211,85 +213,199 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::backend::emulator::rig;
+    use crate::backend::emulator::faults::Faults;
+    use crate::backend::emulator::{self, Emulator, rig};
     use crate::backend::safety::warden::Standing;
     use crate::backend::serial::bench::{Bench, FORMATS, LIMIT, params};
     use crate::backend::wire::Format;
     use proptest::prelude::*;
 
-    fn centre(pole: Pole, format: Format) -> Centre {
-        let plant = rig::Params::default().plant;
-        Centre::new(&Params::default(), pole, LIMIT, &plant, &params(format))
+    /// An armed robot, and what it is led back with.
+    struct Robot {
+        bench: Bench,
+        device: driver::Params,
+        plant: cart_pole::Params,
     }
 
-    /// How long the return of an armed robot takes from a state, at most `patience` s; `None`
-    /// for one that is not there by then.
-    fn returns(bench: &mut Bench, centre: &mut Centre, patience: f64) -> Option<f64> {
-        let (since, mut there, mut farthest) = (bench.now, None, 0.0_f64);
-        while there.is_none() && bench.now - since < Seconds(patience) {
-            bench.steer(0.02, |driver, now| {
-                let wish = centre.see(&driver.latest()?.0, Seconds(0.02));
-                assert!(wish.action.abs() <= 0.4 * LIMIT + 1e-12);
-                if wish.is_there && there.is_none() {
-                    there = Some((now - since).0);
-                }
-                Some(wish.action)
-            });
-            farthest = farthest.max(bench.device.state()[0].abs());
-            assert_eq!(bench.driver.standing(), Standing::Armed);
+    impl Robot {
+        fn new(format: Format, rig: rig::Params, period_ms: u16) -> Self {
+            let mut device = driver::Params { period_ms, ..params(format) };
+            // A potentiometer's angle jumps at its gap, which is beside a hanging pole.
+            device.safety.jump_deg = 180.0;
+            let plant = rig.plant.clone();
+            let emulated = emulator::Params { format, rig, ..emulator::Params::default() };
+            let emulated = Emulator::new(&emulated, &Faults::default(), 1);
+            let mut bench = Bench::of(&device, emulated);
+            bench.home();
+            bench.driver.arm(bench.now).unwrap();
+            Self { bench, device, plant }
         }
-        assert!(farthest < 0.18, "{farthest}");
-        there
-    }
 
-    fn put(bench: &mut Bench, state: [f64; 4]) {
-        bench.driver.disarm(bench.now);
-        bench.device.put(State::new(state));
-        bench.go(0.2);
-        bench.driver.arm(bench.now).unwrap();
-    }
+        fn usual(format: Format) -> Self {
+            Self::new(format, rig::Params::default(), 20)
+        }
 
-    fn is_at_rest(state: &State) -> bool {
-        state[0].abs() < 0.021
-            && state[1].abs() < 0.03
-            && wrapped(state[2] - PI).abs() < 0.06
-            && state[3].abs() < 0.18
-    }
+        fn centre(&self, pole: Pole) -> Centre {
+            Centre::new(&Params::default(), pole, LIMIT, &self.plant, &self.device)
+        }
 
-    #[test]
-    fn a_swinging_pole_comes_to_rest_in_the_middle_within_15_s() {
-        for format in FORMATS {
-            let mut bench = Bench::armed(format);
+        /// How long the return from `start` takes, at most `patience` s; `None` for one that is
+        /// not there by then.
+        fn returns(&mut self, start: [f64; 4], pole: Pole, patience: f64) -> Option<f64> {
+            let mut centre = self.centre(pole);
+            let bench = &mut self.bench;
+            bench.driver.disarm(bench.now);
+            bench.device.put(State::new(start));
+            bench.go(0.2);
+            bench.driver.arm(bench.now).unwrap();
+            let period = Seconds(f64::from(self.device.period_ms) * 1e-3);
+            let (since, mut there, mut farthest) = (bench.now, None, 0.0_f64);
+            while there.is_none() && bench.now - since < Seconds(patience) {
+                bench.steer(period.0, |driver, now| {
+                    let wish = centre.see(&driver.latest()?.0, period);
+                    assert!(wish.action.abs() <= 0.4 * LIMIT + 1e-12);
+                    if wish.is_there && there.is_none() {
+                        there = Some((now - since).0);
+                    }
+                    Some(wish.action)
+                });
+                farthest = farthest.max(bench.device.state()[0].abs());
+                assert_eq!(bench.driver.standing(), Standing::Armed, "{start:?}");
+            }
+            assert!(farthest < 0.18, "{start:?}: {farthest}");
+            there
+        }
+
+        fn comes_to_rest(&mut self, start: [f64; 4], patience: f64) {
+            let took = self.returns(start, Pole::Hanging, patience);
+            // The motor is off: what was taken for rest must be one.
+            self.bench.wish = None;
+            self.bench.go(0.3);
+            let (format, state) = (self.device.format, self.bench.device.state());
+            assert!(took.is_some(), "{format:?} {start:?} {state:?}");
+            assert!(
+                state[0].abs() < 0.025
+                    && state[1].abs() < 0.005
+                    && wrapped(state[2] - PI).abs() < 0.07
+                    && state[3].abs() < 0.3,
+                "{format:?} {start:?} {state:?}"
+            );
+            assert_eq!(self.bench.device.offences(), []);
+        }
+
+        fn swings_out(&mut self) {
             for degrees in [-90.0_f64, 90.0, 20.0] {
                 for x in [-0.15, 0.15] {
-                    put(&mut bench, [x, 0.0, PI + degrees.to_radians(), 0.0]);
-                    let mut centre = centre(Pole::Hanging, format);
-                    let took = returns(&mut bench, &mut centre, 15.0);
-                    eprintln!("{format:?} {degrees} {x} {took:?}");
-                    let state = bench.device.state();
-                    assert!(took.is_some(), "{format:?} {degrees} {x} {state:?}");
-                    assert!(is_at_rest(&state), "{format:?} {degrees} {x} {state:?}");
+                    self.comes_to_rest([x, 0.0, PI + degrees.to_radians(), 0.0], 15.0);
                 }
             }
         }
     }
 
     #[test]
+    fn a_swinging_pole_comes_to_rest_in_the_middle_within_15_s() {
+        FORMATS.into_iter().for_each(|format| Robot::usual(format).swings_out());
+    }
+
+    #[test]
+    fn a_robot_at_another_rate_with_more_friction_comes_to_rest_as_well() {
+        let mut rig = rig::Params::default();
+        (rig.motor.friction_forward, rig.motor.friction_backward) = (0.045, 0.05);
+        FORMATS.into_iter().for_each(|format| Robot::new(format, rig.clone(), 10).swings_out());
+    }
+
+    #[test]
+    fn a_short_pole_comes_to_rest_as_well() {
+        let mut rig = rig::Params::default();
+        (rig.plant.pole_length_m, rig.plant.pole_mass_kg) = (0.092, 0.021);
+        Robot::new(Format::Cobs1, rig, 10).swings_out();
+    }
+
+    #[test]
     fn a_spinning_pole_and_one_that_stands_upright_come_to_rest_too() {
         for format in FORMATS {
-            let mut bench = Bench::armed(format);
+            let mut robot = Robot::usual(format);
             for [x, theta, theta_dot] in
                 [[0.05, 0.0, 14.0], [-0.05, 3.0, -18.0], [0.1, 0.02, 0.0], [0.0, 0.0, 0.0]]
             {
                 // A pole that spins shakes its cart: together they stay where they are.
                 let x_dot = -0.054 * theta_dot * f64::cos(theta);
-                put(&mut bench, [x, x_dot, theta, theta_dot]);
-                let mut centre = centre(Pole::Hanging, format);
-                let took = returns(&mut bench, &mut centre, 60.0);
-                eprintln!("{format:?} {x} {theta} {theta_dot} {took:?}");
-                let state = bench.device.state();
-                assert!(took.is_some(), "{format:?} {theta} {theta_dot} {state:?}");
-                assert!(is_at_rest(&state), "{format:?} {theta} {theta_dot} {state:?}");
+                robot.comes_to_rest([x, x_dot, theta, theta_dot], 40.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_pole_that_a_hand_has_is_left_to_it() {
+        let mut robot = Robot::usual(Format::Cobs1);
+        let took = robot.returns([0.15, 0.0, PI + 0.1, 0.0], Pole::Anywhere, 5.0);
+        assert!(took.is_some());
+        assert!(robot.bench.device.state()[0].abs() < 0.022);
+        // Upright, and not moved by the angle.
+        let mut centre = robot.centre(Pole::Anywhere);
+        let leaning = State::new([0.0, 0.0, 0.3, 1.0]);
+        assert_eq!(centre.see(&leaning, Seconds(0.02)).action, 0.0);
+        assert!(robot.centre(Pole::Hanging).see(&leaning, Seconds(0.02)).action > 0.0);
+    }
+
+    #[test]
+    fn what_does_not_come_to_rest_is_told_when_patience_ends() {
+        for (state, trouble) in [
+            ([0.1, 0.0, PI, 0.0], Some(Unrest::Cart)),
+            ([0.0, 0.0, PI, 1.0], Some(Unrest::Pole)),
+            ([0.0, 0.0, 0.0, 0.0], Some(Unrest::Pole)),
+            ([0.0, 0.0, f64::NAN, 0.0], Some(Unrest::State)),
+            ([0.0, 0.0, -PI, 0.0], None),
+        ] {
+            let (plant, device) = (rig::Params::default().plant, params(Format::Cobs1));
+            let mut centre = Centre::new(&Params::default(), Pole::Hanging, LIMIT, &plant, &device);
+            let mut last = None;
+            for k in 0..1600 {
+                let is_patient = k < 1490;
+                last = Some(centre.see(&State::new(state), Seconds(0.02)));
+                assert!(!is_patient || centre.trouble().is_none());
+            }
+            assert_eq!(centre.trouble(), trouble);
+            assert_eq!(last.unwrap().is_there, trouble.is_none());
+        }
+    }
+
+    #[test]
+    fn the_parameters_have_ranges() {
+        let mut faults = Vec::new();
+        Params::default().check(&mut Checker::new(&mut faults));
+        assert_eq!(faults, []);
+        Params { most: 0.0, rest_deg: f64::NAN, ..Params::default() }
+            .check(&mut Checker::new(&mut faults));
+        assert_eq!(faults.len(), 2);
+    }
+
+    fn any_number() -> impl Strategy<Value = f64> {
+        prop_oneof![any::<f64>(), -10.0..10.0_f64]
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_the_states_no_action_is_beyond_the_most_or_pushes_further_out(
+            states in prop::collection::vec(
+                (any_number(), any_number(), any_number(), any_number(), any_number()), 1..40,
+            ),
+            hangs in any::<bool>(),
+        ) {
+            let (plant, device) = (rig::Params::default().plant, params(Format::Cobs1));
+            let pole = if hangs { Pole::Hanging } else { Pole::Anywhere };
+            let mut centre = Centre::new(&Params::default(), pole, LIMIT, &plant, &device);
+            for (x, x_dot, theta, theta_dot, dt) in states {
+                let state = State::new([x, x_dot, theta, theta_dot]);
+                let wish = centre.see(&state, Seconds(dt));
+                prop_assert!(wish.action.abs() <= 0.4 * LIMIT);
+                if !state.is_finite() {
+                    prop_assert_eq!(wish, Wish { action: 0.0, is_there: false });
+                }
+                // Outward there is only what brakes a cart that goes inward.
+                if x.abs() > 0.17 && x * x_dot >= 0.0 {
+                    prop_assert!(x * wish.action <= 0.0);
+                }
             }
         }
     }

@@ -321,10 +321,7 @@ mod tests {
         assert_eq!(judge(None, &params, "2026-03-14T10:00:00Z"), Err(Uncalibrated::Never));
         let mut other = params;
         other.scales.angle.counts_per_turn = 4069.0;
-        assert_eq!(
-            judge(Some(&made), &other, "2026-03-14T10:00:00Z"),
-            Err(Uncalibrated::Changed)
-        );
+        assert_eq!(judge(Some(&made), &other, "2026-03-14T10:00:00Z"), Err(Uncalibrated::Changed));
         let unreadable = Calibration { at: "soon".to_owned(), ..made };
         assert!(unreadable.is_stale(time("2026-03-14T10:00:00Z"), FRESH_DAYS));
     }
