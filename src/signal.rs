@@ -3,6 +3,8 @@
 //! Everything here has a fixed size, is `Copy` and lives on the stack, so that a control
 //! tick never allocates and a snapshot is a plain copy.
 
+use std::f64::consts::TAU;
+
 use serde::{Deserialize, Serialize};
 
 /// The number of control ticks since the session began.
@@ -126,6 +128,12 @@ pub type Features = Row<6>;
 
 /// What a task counted in one rollout, in the order of its tally's names.
 pub type Tallied = Row<4>;
+
+/// `angle` within half a turn of 0, rad.
+#[must_use]
+pub fn wrapped(angle: f64) -> f64 {
+    angle - TAU * (angle / TAU).round()
+}
 
 /// A plant's input in the plant's own unit (N for the cart-pole).
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd, Serialize, Deserialize)]

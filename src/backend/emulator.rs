@@ -195,6 +195,12 @@ impl Emulator {
         self.rig.state()
     }
 
+    /// Somebody moves the plant by hand to `state`.
+    #[cfg(test)]
+    pub(crate) fn put(&mut self, state: State) {
+        self.rig.put(state);
+    }
+
     /// What happened since this was last asked.
     pub fn take_trace(&mut self) -> Vec<Entry> {
         self.trace.take()

@@ -1,6 +1,10 @@
 //! The plant at the end of a serial line.
 
 pub mod address;
+#[cfg(test)]
+mod bench;
+pub mod calibration;
+pub mod centre;
 pub mod driver;
 mod greeting;
 mod params;
@@ -8,5 +12,6 @@ mod params;
 pub mod port;
 pub mod ports;
 pub mod scales;
+pub mod shelf;
 
 pub use params::Params;

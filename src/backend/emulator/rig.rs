@@ -251,6 +251,12 @@ impl Rig {
         self.state
     }
 
+    /// Somebody moves the plant by hand to `state`.
+    #[cfg(test)]
+    pub(super) fn put(&mut self, state: State) {
+        self.state = state;
+    }
+
     /// Puts `command` on the motor's pins from now on.
     pub fn drive(&mut self, command: i32) {
         self.coming.push_back((self.now + Seconds(self.params.motor.delay_s), command));

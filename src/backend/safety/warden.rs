@@ -16,7 +16,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::check::{Check, Checker};
-use crate::signal::{Seconds, State};
+use crate::signal::{Seconds, State, wrapped};
 
 /// The limits of a real plant. Positions are those of the state's first number, angles of its
 /// third.
@@ -35,7 +35,7 @@ pub struct Params {
     pub stale_periods: f64,
     /// It is stopped when the position jumps further from one state to the next, m,
     pub jump_m: f64,
-    /// or the angle, degrees.
+    /// or the angle, degrees: a potentiometer's stands still for up to 0.09 s beside its gap.
     pub jump_deg: f64,
     /// It is stopped when the device repeats another command than was sent for so many states.
     pub echo_states: u32,
@@ -52,7 +52,7 @@ impl Default for Params {
             angle_limit_deg: None,
             stale_periods: 3.0,
             jump_m: 0.03,
-            jump_deg: 45.0,
+            jump_deg: 120.0,
             echo_states: 3,
             checksum_errors_per_s: 5,
         }
@@ -442,12 +442,6 @@ impl Warden {
 
 /// A pause of the caller that no scheduler explains.
 const CLOCK_JUMP: Seconds = Seconds(1.0);
-
-/// `angle` within half a turn of 0, rad.
-fn wrapped(angle: f64) -> f64 {
-    let turn = std::f64::consts::TAU;
-    angle - turn * (angle / turn).round()
-}
 
 #[cfg(test)]
 #[path = "warden_tests.rs"]

@@ -166,9 +166,15 @@ mod tests {
         };
         assert_eq!(address("usb:1a86:7523"), named(None));
         assert_eq!(address("usb:1A86:7523:A1:B2"), named(Some("A1:B2")));
-        for wrong in ["", "usb:", "usb:1a86", "usb:1a86:xyz", "usb:11a86:1", "usb:1:2:",
-            "/dev/serial/by-id/"]
-        {
+        for wrong in [
+            "",
+            "usb:",
+            "usb:1a86",
+            "usb:1a86:xyz",
+            "usb:11a86:1",
+            "usb:1:2:",
+            "/dev/serial/by-id/",
+        ] {
             assert!(address(wrong).is_err(), "{wrong}");
         }
         for words in ["/dev/ttyACM3", "usb:1a86:7523", "usb:1a86:7523:A1"] {

@@ -84,6 +84,8 @@ pub struct Driver {
     /// When a burst of stops was written, after which nothing was.
     burst: Option<Seconds>,
     damaged: u64,
+    /// The latest state as it was on the wire.
+    frame: Option<StateFrame>,
     out: Vec<u8>,
 }
 
@@ -112,6 +114,7 @@ impl Driver {
             stopped: Stopped::No,
             burst: None,
             damaged: 0,
+            frame: None,
             out: Vec::new(),
         }
     }
@@ -122,6 +125,7 @@ impl Driver {
         self.out.clear();
         self.warden.forget();
         self.tracker.forget();
+        self.frame = None;
         self.stage = Stage::Opening;
         self.is_homed = !self.params.homing;
         self.owes = false;
@@ -142,6 +146,7 @@ impl Driver {
         self.owes = false;
         self.is_homed = false;
         self.warden.forget();
+        self.frame = None;
         if was_armed {
             self.stopped = Stopped::Unconfirmed;
         }
@@ -315,6 +320,12 @@ impl Driver {
         self.warden.latest().map(|seen| (seen.state, seen.at))
     }
 
+    /// The latest state as it was on the wire, in counts: what a calibration looks at.
+    #[must_use]
+    pub const fn frame(&self) -> Option<&StateFrame> {
+        self.frame.as_ref()
+    }
+
     /// What became of the bytes so far.
     #[must_use]
     pub fn counts(&self) -> Counts {
@@ -359,6 +370,7 @@ impl Driver {
                 self.greet(now);
             }
             Stage::Ready => {
+                self.frame = Some(*frame);
                 self.speed = state.get(1).copied().unwrap_or(0.0);
                 let held = Some(i64::from(frame.command));
                 let stopped = self.stopped_itself(frame);
@@ -460,6 +472,7 @@ impl Driver {
         self.stage = Stage::Ready;
         self.warden.forget();
         self.tracker.forget();
+        self.frame = None;
         self.since = now;
         // Homing leaves the old command behind.
         self.stop(now);

@@ -1,87 +1,9 @@
 use super::*;
 use crate::backend::emulator::faults::{Fault as Broken, Faults, Noise, Timed};
 use crate::backend::emulator::rig::Sensor;
-use crate::backend::emulator::{self, Emulator};
-use crate::backend::serial::scales;
+use crate::backend::serial::bench::{Bench, FORMATS, LIMIT, PERIOD, STEP, params};
 use crate::random::{Place, Purpose, stream};
 use rand::RngExt;
-
-/// The largest action of the emulated robot, N.
-const LIMIT: f64 = 1.77;
-/// A state comes each, s.
-const PERIOD: Seconds = Seconds(0.02);
-/// How often whoever owns the port moves bytes.
-const STEP: f64 = 0.001;
-
-fn params(format: Format) -> Params {
-    let angle = scales::Angle { invert: true, ..scales::Angle::default() };
-    let scales = scales::Params { angle, ..scales::Params::default() };
-    Params { format, scales, ..Params::default() }
-}
-
-/// A driver and a device, on virtual time.
-struct Bench {
-    driver: Driver,
-    device: Emulator,
-    now: Seconds,
-    /// What the person's and the robot's controls want; `None`: the hand is off the switch.
-    wish: Option<f64>,
-    was_plugged: bool,
-}
-
-impl Bench {
-    fn new(format: Format, faults: &Faults, seed: u64) -> Self {
-        let device = emulator::Params { format, ..emulator::Params::default() };
-        let mut driver = Driver::new(&params(format), PERIOD, LIMIT);
-        driver.opened(Seconds(0.0));
-        let device = Emulator::new(&device, faults, seed);
-        Self { driver, device, now: Seconds(0.0), wish: None, was_plugged: true }
-    }
-
-    /// Lets `time_s` pass.
-    fn go(&mut self, time_s: f64) {
-        let end = self.now + Seconds(time_s);
-        while self.now < end {
-            self.now = self.now + Seconds(STEP);
-            let is_plugged = self.device.is_plugged();
-            if self.was_plugged && !is_plugged {
-                self.driver.lost("unplugged");
-            } else if is_plugged && !self.was_plugged {
-                self.driver.opened(self.now);
-            }
-            self.was_plugged = is_plugged;
-            let written = self.driver.take_output();
-            let read = self.device.advance(self.now, &written);
-            self.driver.read(&read, self.now);
-            self.driver.pass(self.now);
-            if self.driver.owes_command() {
-                if let Some(action) = self.wish {
-                    self.driver.want(Wanted { action, at: self.now, is_enabled: true });
-                }
-                self.driver.answer(self.now);
-            }
-        }
-    }
-
-    /// Until it is ready, homed and armed.
-    fn armed(format: Format) -> Self {
-        let mut bench = Self::new(format, &Faults::default(), 1);
-        bench.home();
-        bench.driver.arm(bench.now).unwrap();
-        bench
-    }
-
-    fn home(&mut self) {
-        self.go(1.5);
-        assert_eq!(*self.driver.stage(), Stage::Ready);
-        self.driver.home(self.now).unwrap();
-        self.go(20.0);
-        assert!(self.driver.is_homed(), "{:?}", self.driver.stage());
-        self.go(0.5);
-    }
-}
-
-const FORMATS: [Format; 2] = [Format::Sensorsini31, Format::Cobs1];
 
 #[test]
 fn a_device_is_greeted_homed_armed_driven_and_stopped() {

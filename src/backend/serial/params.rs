@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::scales;
+use super::{centre, scales};
 use crate::backend::emulator::rig;
 use crate::backend::safety::warden;
 use crate::backend::wire::{Baud, Format};
@@ -33,6 +33,8 @@ pub struct Params {
     pub push: f64,
     /// for so long, s.
     pub push_s: f64,
+    /// The return to the middle of the track.
+    pub centre: centre::Params,
     /// From counts to the plant, and back.
     pub scales: scales::Params,
     /// The plant's limits.
@@ -54,6 +56,7 @@ impl Default for Params {
             calibration_days: 7.0,
             push: 0.5,
             push_s: 0.2,
+            centre: centre::Params::default(),
             scales: scales::Params::default(),
             safety: warden::Params::default(),
             emulated: rig::Params::default(),
@@ -70,6 +73,7 @@ impl Check for Params {
         c.range("calibration_days", self.calibration_days, 0.01..=3650.0);
         c.range("push", self.push, 0.0..=1.0);
         c.range("push_s", self.push_s, 0.0..=1.0);
+        self.centre.check(&mut c.section("centre"));
         self.scales.check(&mut c.section("scales"));
         self.safety.check(&mut c.section("safety"));
         self.emulated.check(&mut c.section("emulated"));

@@ -9,7 +9,9 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags, open};
 use rustix::io::Errno;
 use rustix::pipe::{PipeFlags, pipe_with};
-use rustix::termios::{ControlModes, OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr};
+use rustix::termios::{
+    ControlModes, OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr,
+};
 use serialport::TTYPort;
 
 use crate::signal::Seconds;
@@ -65,9 +67,8 @@ impl Port {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
         // Opened first: once the settings' own end is open nobody else gets in.
         let wire = open(path, flags, Mode::empty()).map_err(|why| closed(why.to_string()))?;
-        let settings = serialport::new(path, baud)
-            .open_native()
-            .map_err(|why| closed(why.to_string()))?;
+        let settings =
+            serialport::new(path, baud).open_native().map_err(|why| closed(why.to_string()))?;
         let (woken, bell) = pipe_with(PipeFlags::NONBLOCK | PipeFlags::CLOEXEC)
             .map_err(|why| closed(why.to_string()))?;
         let port = Self { wire, _settings: settings, woken };
@@ -83,10 +84,8 @@ impl Port {
     /// When the device is gone; it is to be closed at once then.
     pub fn read(&self, buffer: &mut [u8], patience: Seconds) -> Result<usize, Lost> {
         let lost = |why: Errno| Lost(why.to_string());
-        let mut polled = [
-            PollFd::new(&self.wire, PollFlags::IN),
-            PollFd::new(&self.woken, PollFlags::IN),
-        ];
+        let mut polled =
+            [PollFd::new(&self.wire, PollFlags::IN), PollFd::new(&self.woken, PollFlags::IN)];
         let patience = Duration::from_secs_f64(patience.0.clamp(0.0, 1.0));
         let patience = Timespec { tv_sec: 0, tv_nsec: patience.subsec_nanos().into() };
         match poll(&mut polled, Some(&patience)) {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::backend::wire::StateFrame;
 use crate::check::{Check, Checker};
-use crate::signal::{Seconds, State};
+use crate::signal::{Seconds, State, wrapped};
 
 /// How a cart-pole's counts are read and its motor is driven.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -222,11 +222,6 @@ impl Tracker {
         self.device = Some((frame.time_us, at));
         (at, if is_sensible { passed } else { self.period })
     }
-}
-
-/// `angle` within half a turn of 0, rad.
-fn wrapped(angle: f64) -> f64 {
-    angle - TAU * (angle / TAU).round()
 }
 
 #[cfg(test)]
