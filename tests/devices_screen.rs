@@ -317,7 +317,7 @@ fn a_map_is_learned_by_moving_and_saved_without_replacing_anything_unasked() {
 fn learning_is_left_with_m_and_ends_when_the_pad_goes() {
     let mut desk = with_pads();
     desk.keys("mm");
-    assert!(!desk.picture(80, 24).contains("1 of 5"));
+    assert!(!desk.picture(80, 24).contains("1 of 6"));
     desk.keys("m");
     assert_eq!(desk.key(KeyCode::Char('q')), Reaction::Stay);
     desk.hear(&Event::Disconnected(Id(1)));
