@@ -72,6 +72,25 @@ pub enum News {
     Remark(String),
 }
 
+/// The dead-man switch of an operator: real hardware moves only while a hand is on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Switch {
+    /// It has none, or none that can be trusted.
+    None,
+    /// A hand is on it now.
+    Held,
+    /// It is let go, or not heard of: its device is gone, silent or out of focus.
+    Free,
+}
+
+impl Switch {
+    /// A switch that can be trusted, and whether it `is_held`.
+    #[must_use]
+    pub const fn of(is_held: bool) -> Self {
+        if is_held { Self::Held } else { Self::Free }
+    }
+}
+
 /// What an operator has steered before a rollout, in introduction and main together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Practice {
@@ -104,6 +123,18 @@ pub trait Operator: Send {
     /// wait for ever.
     fn is_over(&self) -> bool {
         false
+    }
+
+    /// Whether a hand is on the dead-man switch at `now`, the session's time; asked at every
+    /// tick of a session with real hardware. Never blocks.
+    fn switch(&mut self, _now: Seconds) -> Switch {
+        Switch::None
+    }
+
+    /// What the person does to keep the switch held, in ASCII, such as "hold L1"; `None` where
+    /// there is no switch.
+    fn switch_name(&self) -> Option<String> {
+        None
     }
 
     /// The latest wish; never blocks. Called in the countdown too, where it has no effect.

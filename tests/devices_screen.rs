@@ -279,17 +279,19 @@ fn a_map_is_learned_by_moving_and_saved_without_replacing_anything_unasked() {
     desk.keys("s");
     desk.shows("nothing was learned yet");
     desk.keys("m");
-    desk.shows("1 of 5: move the stick that steers to the right");
+    desk.shows("1 of 6: move the stick that steers to the right");
     desk.axis(Axis::RightZ, &[-1.0]);
     desk.axis(Axis::RightStickX, &[-0.2, -0.6, -0.97, -0.5, -0.1, 0.0]);
-    desk.shows("2 of 5: press the button for begin");
+    desk.shows("2 of 6: press the button for begin");
     desk.button(Button::South);
     desk.button(Button::South);
     desk.shows("south is for begin already");
     insta::assert_snapshot!("devices_learning_80x24", desk.picture(80, 24));
     desk.button(Button::West);
     desk.key(KeyCode::Delete);
-    desk.shows("5 of 5");
+    desk.shows("5 of 6");
+    desk.key(KeyCode::Esc);
+    desk.shows("6 of 6: press the button for enable");
     desk.key(KeyCode::Esc);
     pictures!("devices_learned", desk);
     let map = desk.devices.profile().operator.gamepad.clone();
@@ -315,7 +317,7 @@ fn a_map_is_learned_by_moving_and_saved_without_replacing_anything_unasked() {
 fn learning_is_left_with_m_and_ends_when_the_pad_goes() {
     let mut desk = with_pads();
     desk.keys("mm");
-    assert!(!desk.picture(80, 24).contains("1 of 5"));
+    assert!(!desk.picture(80, 24).contains("1 of 6"));
     desk.keys("m");
     assert_eq!(desk.key(KeyCode::Char('q')), Reaction::Stay);
     desk.hear(&Event::Disconnected(Id(1)));

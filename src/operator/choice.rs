@@ -33,6 +33,18 @@ impl Params {
             Device::Mouse => &self.mouse.shape,
         }
     }
+
+    /// What the person does to keep the dead-man switch of `device` held, in ASCII, such as
+    /// "hold L1"; `None` where the profile gives it none. A keyboard has one only where the
+    /// terminal reports releases.
+    #[must_use]
+    pub fn switch_name(&self, device: Device) -> Option<String> {
+        match device {
+            Device::Keyboard => Some(self.keyboard.switch_name()),
+            Device::Gamepad => self.gamepad.map.switch_name(),
+            Device::Mouse => Some(self.mouse.enable.switch_name()),
+        }
+    }
 }
 
 /// What a hand can be on.
@@ -207,6 +219,21 @@ impl From<Choice> for String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_switch_is_named_after_the_profile_and_in_ascii() {
+        let mut params = Params::default();
+        let names = |params: &Params| Device::ALL.map(|device| params.switch_name(device));
+        let told = |names: [&str; 3]| names.map(|name| Some(name.to_owned()));
+        assert_eq!(names(&params), told(["hold e", "hold L1", "hold the left mouse button"]));
+        params.keyboard.enable = 'j';
+        params.gamepad.map.enable = Some(gamepad::Button::Code(7));
+        params.mouse.enable = mouse::Button::Middle;
+        let others = told(["hold j", "hold code(7)", "hold the middle mouse button"]);
+        assert_eq!(names(&params), others);
+        params.gamepad.map.enable = None;
+        assert_eq!(params.switch_name(Device::Gamepad), None);
+    }
 
     #[test]
     fn choices_read_back_and_wrong_words_list_them() {

@@ -24,7 +24,7 @@ use std::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use super::shaping::{Shape, Shaper};
-use super::{Badge, Feedback, News, Operator, Practice, View};
+use super::{Badge, Feedback, News, Operator, Practice, Switch, View};
 use crate::check::{Check, Checker};
 use crate::random::Place;
 use crate::signal::{Action, Intent, Seconds};
@@ -43,7 +43,7 @@ pub struct Params {
     pub sdl_mappings: Vec<String>,
     /// A pad that was plugged in steers once its deflection has been within this of rest.
     pub centre: f64,
-    /// A relayed pad that is silent for longer steers no more, s;
+    /// A relayed pad that is silent for longer steers no more, and its switch is free, s;
     pub silent_s: f64,
     /// for longer than this, and the rollout waits, as without a pad.
     pub lost_s: f64,
@@ -124,7 +124,7 @@ fn is_sdl_mapping(line: &str) -> bool {
 pub struct Gamepad {
     pads: Pads,
     source: Source,
-    /// A relayed pad that is silent for longer is nobody's wish,
+    /// A relayed pad that is silent for longer is nobody's wish, nor is a hand on its switch,
     silent: Seconds,
     /// and for longer than this it is lost.
     lost_after: Seconds,
@@ -235,6 +235,18 @@ impl Operator for Gamepad {
 
     fn is_over(&self) -> bool {
         self.source.is_over()
+    }
+
+    fn switch(&mut self, now: Seconds) -> Switch {
+        self.hear(now);
+        match self.pads.switch() {
+            Switch::Held => Switch::of(self.source.is_heard(self.silent)),
+            other => other,
+        }
+    }
+
+    fn switch_name(&self) -> Option<String> {
+        self.pads.map().switch_name()
     }
 
     fn intent(&mut self, view: View<'_>) -> Intent {

@@ -1,5 +1,7 @@
 use super::events::Events;
+use super::link::Link;
 use super::*;
+use crate::clock::{Clock, WallClock};
 use crate::operator::Request;
 use crate::signal::State;
 
@@ -92,6 +94,83 @@ fn buttons_ask_and_without_any_pad_nobody_steers() {
     let mut none = Gamepad::new(Source::nothing("no way"), &Params::default(), 1.0, TICK);
     assert_eq!(wish(&mut none, 0.0).1, Intent::Absent);
     assert_eq!(none.badge().trouble(), Some("no way".to_owned()));
+}
+
+/// The switch at the times `now`, asked as the control cycle asks.
+fn switches(gamepad: &mut Gamepad, now: &[f64]) -> Vec<Switch> {
+    let mut at = |now: &f64| {
+        wish(gamepad, *now);
+        gamepad.switch(Seconds(*now))
+    };
+    now.iter().map(&mut at).collect()
+}
+
+#[test]
+fn the_switch_is_held_from_press_to_release_whatever_else_is_pressed() {
+    use Switch::{Free, Held};
+    let table = "0,connect,1,A,\n1,press,1,left_trigger,\n2,press,1,south,\n2,release,1,south,\n\
+                 3,axis,1,left_stick_x,1\n4,release,1,left_trigger,\n";
+    let mut pad = scripted(table, &Params::default());
+    assert_eq!(pad.switch_name().as_deref(), Some("hold L1"));
+    let told = switches(&mut pad, &[0.0, 0.98, 1.0, 2.0, 3.0, 4.0, 9.0]);
+    assert_eq!(told, [Free, Free, Held, Held, Held, Free, Free]);
+    let none = Map { enable: None, ..Map::default() };
+    let mut pad = scripted(table, &Params { map: none, ..Params::default() });
+    assert_eq!((pad.switch(Seconds(1.0)), pad.switch_name()), (Switch::None, None));
+    let other = Map { enable: Some(Button::South), ..Map::default() };
+    let mut pad = scripted(table, &Params { map: other, ..Params::default() });
+    assert_eq!(switches(&mut pad, &[1.0, 1.98, 2.0]), [Free, Free, Free]);
+}
+
+#[test]
+fn an_unplugged_pad_and_one_that_does_not_steer_have_a_free_switch() {
+    use Switch::{Free, Held};
+    let mut pad = scripted(
+        "0,connect,1,A,\n0,connect,2,B,\n1,press,2,left_trigger,\n2,press,1,left_trigger,\n\
+         3,release,2,left_trigger,\n4,press,2,start,\n5,press,2,left_trigger,\n\
+         6,disconnect,2,,\n7,connect,2,B,\n8,press,2,left_trigger,\n",
+        &Params::default(),
+    );
+    // From 4 s on B steers, whose switch is pressed at 5 s; A's is held throughout.
+    let told = switches(&mut pad, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
+    assert_eq!(told, [Free, Held, Held, Free, Held, Free, Free, Held]);
+}
+
+/// A relay's line with one pad, whose switch is held.
+fn relayed(clock: WallClock) -> Link {
+    let link = Link::default();
+    let mut outlet = relay::Outlet::new(1);
+    let mut pads = Pads::new(&Params::default());
+    let (name, mapping) = ("Far".to_owned(), String::new());
+    let about = About { id: Id(1), name, guid: String::new(), mapping };
+    pads.take(Event::Connected(about), Seconds(0.0));
+    let (button, is_pressed) = (Button::LeftTrigger, true);
+    pads.take(Event::Button { pad: Id(1), button, is_pressed }, Seconds(0.0));
+    link.take(outlet.line(&pads, Seconds(0.0)).as_bytes(), clock.now());
+    link
+}
+
+#[test]
+fn a_relayed_switch_is_held_while_the_relay_is_heard() {
+    let mut clock = WallClock::start();
+    let steer = |link: &Link, silent_s| {
+        let params = Params { silent_s, ..Params::default() };
+        Gamepad::new(Source::relay(link.clone(), clock), &params, 1.0, TICK)
+    };
+    let (live, stale, over) = (relayed(clock), relayed(clock), relayed(clock));
+    let mut pad = steer(&live, 5.0);
+    assert_eq!(pad.switch(Seconds(0.0)), Switch::Held);
+    let mut pad = steer(&over, 5.0);
+    assert_eq!(pad.switch(Seconds(0.0)), Switch::Held);
+    over.end("over", clock.now());
+    // In the same tick, before the pad is known to be gone, and after.
+    assert_eq!(pad.switch(Seconds(0.0)), Switch::Free);
+    assert_eq!(pad.switch(Seconds(0.02)), Switch::Free);
+    let mut pad = steer(&stale, 0.05);
+    clock.wait_until(clock.now() + Seconds(0.06));
+    assert_eq!(pad.switch(Seconds(0.0)), Switch::Free);
+    let mut none = Gamepad::new(Source::nothing("no way"), &Params::default(), 1.0, TICK);
+    assert_eq!(none.switch(Seconds(0.0)), Switch::Free);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub use pointer::{Grid, Pointer};
 
 use super::shaping::{Shape, Shaper};
-use super::{Badge, News, Operator, Practice, View};
+use super::{Badge, News, Operator, Practice, Switch, View};
 use crate::check::{Check, Checker};
 use crate::clock::{Clock, WallClock};
 use crate::random::Place;
@@ -50,6 +50,32 @@ pub enum Along {
     Vertical,
 }
 
+/// A button of the mouse.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Button {
+    /// Under the index finger of a right hand.
+    #[default]
+    Left,
+    /// The wheel.
+    Middle,
+    /// The other one.
+    Right,
+}
+
+impl Button {
+    /// What keeps it held as the dead-man switch, for people.
+    #[must_use]
+    pub fn switch_name(self) -> String {
+        let which = match self {
+            Self::Left => "left",
+            Self::Middle => "middle",
+            Self::Right => "right",
+        };
+        format!("hold the {which} mouse button")
+    }
+}
+
 /// The mouse's parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -71,6 +97,8 @@ pub struct Params {
     pub damper: f64,
     /// Whether the pointer is hidden over the live screen, where the terminal can.
     pub hide_pointer: bool,
+    /// The dead-man switch: real hardware moves only while this button is held.
+    pub enable: Button,
     /// From the pointer's velocity or position to the action or place.
     pub shape: Shape,
 }
@@ -86,6 +114,7 @@ impl Default for Params {
             spring: 2.0,
             damper: 0.8,
             hide_pointer: true,
+            enable: Button::default(),
             shape: Shape::default(),
         }
     }
@@ -206,6 +235,14 @@ impl Operator for Mouse {
     /// Numbers mean more or less by how finely the pointer is known: `events.csv` has it.
     fn news(&mut self, _now: Seconds) -> Option<News> {
         self.tell().map(News::Remark)
+    }
+
+    fn switch(&mut self, _now: Seconds) -> Switch {
+        Switch::of(self.pointer.is_held(self.params.enable))
+    }
+
+    fn switch_name(&self) -> Option<String> {
+        Some(self.params.enable.switch_name())
     }
 
     fn intent(&mut self, view: View<'_>) -> Intent {

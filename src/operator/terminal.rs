@@ -3,18 +3,22 @@
 //! The terminal has one reader, the screen's; it feeds the keys to [`Hands`], and the
 //! [`Keyboard`] samples them at each tick. Both must use the same clock.
 
+mod enable;
 mod hold;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseEvent};
+use crossterm::event::{
+    KeyCode, KeyEvent, KeyEventKind, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
+};
 use serde::{Deserialize, Serialize};
 
+use enable::Enable;
 pub use hold::{Direction, Hold, KeyReleases, Timing};
 
-use super::mouse::Pointer;
+use super::mouse::{Button, Pointer};
 use super::shaping::{Shape, Shaper};
-use super::{Badge, News, Operator, Practice, View};
+use super::{Badge, News, Operator, Practice, Switch, View};
 use crate::check::{Check, Checker};
 use crate::clock::{Clock, WallClock};
 use crate::random::Place;
@@ -34,6 +38,8 @@ pub struct Params {
     pub tap_hold_s: f64,
     /// How long a key repeat pushes there, s; `None`: 1.6 times the measured interval.
     pub repeat_hold_s: Option<f64>,
+    /// The dead-man switch: real hardware moves only while this key is held.
+    pub enable: char,
     /// From the keys' push to the action.
     pub shape: Shape,
 }
@@ -46,6 +52,7 @@ impl Default for Params {
             fall_s: 0.0,
             tap_hold_s: 0.12,
             repeat_hold_s: None,
+            enable: 'e',
             shape: Shape::default(),
         }
     }
@@ -60,14 +67,50 @@ impl Check for Params {
         if let Some(hold) = self.repeat_hold_s {
             c.range("repeat_hold_s", hold, 0.02..=1.0);
         }
+        let is_free = ENABLE_KEYS.contains(self.enable);
+        c.demand(
+            is_free,
+            "enable",
+            self.enable,
+            "a letter without another meaning: b, c, e, g, i, j, k, n, u, w, y or z",
+        );
         self.shape.check(&mut c.section("shape"));
     }
 }
 
-/// The steering keys' state, shared by the reader that feeds it and the [`Keyboard`].
+impl Params {
+    /// What keeps the dead-man switch held, for people.
+    #[must_use]
+    pub fn switch_name(&self) -> String {
+        format!("hold {}", self.enable)
+    }
+}
+
+/// The keys that can be the dead-man switch: letters, which are the same with and without
+/// Shift, that neither steer nor are a key of a screen.
+pub const ENABLE_KEYS: &str = "bcegijknuwyz";
+
+/// What is known of the keys.
+#[derive(Clone, Debug)]
+struct Keys {
+    hold: Hold,
+    enable: Enable,
+}
+
+impl Keys {
+    fn new(params: &Params) -> Self {
+        Self { hold: Hold::new(timing(params)), enable: Enable::new(params.enable) }
+    }
+
+    fn knows_releases(&self) -> bool {
+        self.hold.knowledge() == KeyReleases::Reported
+    }
+}
+
+/// The steering keys' and the switch's state, shared by the reader that feeds it and the [`Keyboard`].
 #[derive(Clone, Debug)]
 pub struct Hands {
-    hold: Arc<Mutex<Hold>>,
+    keys: Arc<Mutex<Keys>>,
     /// What lies between the person's terminal and this program.
     inside: Option<&'static str>,
 }
@@ -76,7 +119,7 @@ impl Hands {
     /// Hands that touch no key.
     #[must_use]
     pub fn new(params: &Params) -> Self {
-        Self { hold: Arc::new(Mutex::new(Hold::new(timing(params)))), inside: None }
+        Self { keys: Arc::new(Mutex::new(Keys::new(params))), inside: None }
     }
 
     /// The same hands, at a terminal within tmux or screen, which may swallow releases.
@@ -86,16 +129,22 @@ impl Hands {
         self
     }
 
-    /// Lets all keys go and from now on keeps the times of `params`.
-    pub fn set_timing(&self, params: &Params) {
-        let mut hold = self.hold();
-        let known = hold.knowledge();
-        *hold = Hold::new(timing(params));
-        hold.set_knowledge(known);
+    /// Lets all keys go and from now on keeps to `params`.
+    pub fn set_params(&self, params: &Params) {
+        let mut keys = self.keys();
+        let known = keys.hold.knowledge();
+        *keys = Keys::new(params);
+        keys.hold.set_knowledge(known);
     }
 
-    /// Takes a key event if it steers, and says whether it did.
+    /// Takes a key event if it steers or is the switch's, and says whether it did.
     pub fn feed(&self, key: &KeyEvent, now: Seconds) -> bool {
+        {
+            let keys = &mut *self.keys();
+            if keys.enable.take(key, keys.hold.knowledge()) {
+                return true;
+            }
+        }
         let Some(direction) = direction(key) else { return false };
         match key.kind {
             KeyEventKind::Press => self.press(direction, now),
@@ -107,45 +156,55 @@ impl Hands {
 
     /// A key went down at `now`.
     pub fn press(&self, direction: Direction, now: Seconds) {
-        self.hold().press(direction, now);
+        self.keys().hold.press(direction, now);
     }
 
     /// A key is still down at `now`.
     pub fn repeat(&self, direction: Direction, now: Seconds) {
-        self.hold().repeat(direction, now);
+        self.keys().hold.repeat(direction, now);
     }
 
     /// A key went up at `now`.
     pub fn release(&self, direction: Direction, now: Seconds) {
-        self.hold().release(direction, now);
+        self.keys().hold.release(direction, now);
     }
 
     /// Lets all keys go, since the focus is lost or a new session begins.
     pub fn release_all(&self) {
-        self.hold().release_all();
+        let mut keys = self.keys();
+        keys.hold.release_all();
+        keys.enable.release();
     }
 
     /// Says whether the terminal reports releases.
     pub fn set_releases_known(&self, known: bool) {
-        self.hold().set_knowledge(if known {
-            KeyReleases::Reported
-        } else {
-            KeyReleases::Estimated
-        });
+        let mut keys = self.keys();
+        keys.hold.set_knowledge(if known { KeyReleases::Reported } else { KeyReleases::Estimated });
+        if !known {
+            keys.enable.release();
+        }
+    }
+
+    /// The dead-man switch; none where releases are estimated, for a hand that let go would
+    /// seem to hold on.
+    #[must_use]
+    pub fn switch(&self) -> Switch {
+        let keys = self.keys();
+        if keys.knows_releases() { Switch::of(keys.enable.is_held()) } else { Switch::None }
     }
 
     /// How releases are known.
     #[must_use]
     pub fn knowledge(&self) -> KeyReleases {
-        self.hold().knowledge()
+        self.keys().hold.knowledge()
     }
 
     /// How releases are known, in words for the person, and how late they may be.
     #[must_use]
     pub fn release_words(&self) -> (String, String) {
-        let hold = self.hold();
-        let known = hold.knowledge().words();
-        let Some(late) = hold.lateness() else { return (known.to_owned(), String::new()) };
+        let keys = self.keys();
+        let known = keys.hold.knowledge().words();
+        let Some(late) = keys.hold.lateness() else { return (known.to_owned(), String::new()) };
         let inside = self.inside.map_or(String::new(), |inside| format!(" inside {inside}"));
         (format!("{known}{inside}"), format!("up to {:.0} ms late", late.0 * 1000.0))
     }
@@ -162,18 +221,18 @@ impl Hands {
     /// The time of the last steering key's event, if there was one.
     #[must_use]
     pub fn last_event(&self) -> Option<Seconds> {
-        self.hold().last_event()
+        self.keys().hold.last_event()
     }
 
     /// The push at `now`, −1 to 1.
     #[must_use]
     pub fn push(&self, now: Seconds) -> f64 {
-        self.hold().push(now)
+        self.keys().hold.push(now)
     }
 
     /// The keys' state stays whole even if a thread died holding it.
-    fn hold(&self) -> MutexGuard<'_, Hold> {
-        self.hold.lock().unwrap_or_else(PoisonError::into_inner)
+    fn keys(&self) -> MutexGuard<'_, Keys> {
+        self.keys.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -186,9 +245,24 @@ fn timing(params: &Params) -> Timing {
     }
 }
 
-/// Feeds `pointer` with a mouse event, whose time is `now`; a button moves nothing.
+/// Feeds `pointer` with a mouse event, whose time is `now`.
 pub fn point(pointer: &Pointer, event: &MouseEvent, now: Seconds) {
     pointer.moves_to(event.column, event.row, now);
+    match event.kind {
+        MouseEventKind::Down(which) => pointer.press(button(which)),
+        MouseEventKind::Up(which) => pointer.release(button(which)),
+        // It moves with no button held: should one have seemed so, its release was lost.
+        MouseEventKind::Moved => pointer.release_all(),
+        _ => {}
+    }
+}
+
+const fn button(which: MouseButton) -> Button {
+    match which {
+        MouseButton::Left => Button::Left,
+        MouseButton::Middle => Button::Middle,
+        MouseButton::Right => Button::Right,
+    }
 }
 
 /// The direction of a steering key: arrows, h/l, a/d; stop is down or s.
@@ -213,6 +287,7 @@ pub struct Keyboard {
     hands: Hands,
     clock: WallClock,
     push: f64,
+    switch_name: String,
     shaper: Shaper,
     badge: Badge,
     /// What the badge says of releases.
@@ -227,7 +302,8 @@ impl Keyboard {
         let shaper = Shaper::new(params.shape, limit, tick);
         let badge = Badge::default();
         let told = Default::default();
-        let mut keyboard = Self { hands, clock, push: params.push, shaper, badge, told };
+        let (push, switch_name) = (params.push, params.switch_name());
+        let mut keyboard = Self { hands, clock, push, switch_name, shaper, badge, told };
         keyboard.tell();
         keyboard
     }
@@ -258,11 +334,18 @@ impl Operator for Keyboard {
         None
     }
 
+    fn switch(&mut self, _now: Seconds) -> Switch {
+        self.hands.switch()
+    }
+
+    fn switch_name(&self) -> Option<String> {
+        (self.hands.switch() != Switch::None).then(|| self.switch_name.clone())
+    }
+
     fn intent(&mut self, _view: View<'_>) -> Intent {
         let now = self.clock.now();
-        let hold = self.hands.hold();
-        let age = hold.last_event().map_or(0.0, |at| (now - at).0.max(0.0));
-        let raw = self.push * hold.push(now);
+        let age = self.hands.last_event().map_or(0.0, |at| (now - at).0.max(0.0));
+        let raw = self.push * self.hands.push(now);
         let action = Action(self.shaper.shape(raw));
         Intent::Present { action, raw: Some(raw), age: Seconds(age) }
     }
@@ -275,7 +358,9 @@ impl Operator for Keyboard {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::operator::mouse::Mouse;
     use crate::signal::State;
+    use proptest::prelude::*;
 
     #[test]
     fn a_held_arrow_pushes_half_the_limit() {
@@ -321,5 +406,168 @@ mod tests {
         key.kind = KeyEventKind::Release;
         assert_eq!(direction(&key), Some(Direction::Left));
         assert_eq!(direction(&KeyEvent::new(KeyCode::Char('q'), KeyModifiers::NONE)), None);
+    }
+
+    fn key(letter: char, kind: KeyEventKind) -> KeyEvent {
+        KeyEvent::new_with_kind(KeyCode::Char(letter), KeyModifiers::NONE, kind)
+    }
+
+    #[test]
+    fn the_key_is_a_switch_only_where_releases_are_reported() {
+        use KeyEventKind::{Press, Release, Repeat};
+        let params = Params::default();
+        let hands = Hands::new(&params);
+        let clock = WallClock::start();
+        let mut keyboard = Keyboard::new(hands.clone(), clock, &params, 10.0, Seconds(0.02));
+        assert!(hands.feed(&key('e', Press), Seconds(0.0)));
+        assert_eq!(keyboard.switch(Seconds(0.0)), Switch::None);
+        assert_eq!(keyboard.switch_name(), None);
+        // What went down before has to go down once more.
+        hands.set_releases_known(true);
+        assert_eq!(keyboard.switch_name().as_deref(), Some("hold e"));
+        let mut after = |letter, kind| {
+            hands.feed(&key(letter, kind), Seconds(0.0));
+            keyboard.switch(Seconds(0.0))
+        };
+        assert_eq!(after('e', Repeat), Switch::Free);
+        assert_eq!(after('e', Press), Switch::Held);
+        // Other keys come and go, and Shift makes no other key of it.
+        for (letter, kind) in [('a', Press), ('e', Repeat), ('a', Release), ('x', Press)] {
+            assert_eq!(after(letter, kind), Switch::Held);
+        }
+        assert_eq!(after('E', Release), Switch::Free);
+        assert_eq!(after('e', Repeat), Switch::Free);
+        assert_eq!(after('E', Press), Switch::Held);
+        hands.release_all();
+        assert_eq!(after('e', Repeat), Switch::Free);
+        let ctrl = KeyEvent::new(KeyCode::Char('e'), KeyModifiers::CONTROL);
+        assert!(!hands.feed(&ctrl, Seconds(0.0)));
+        assert_eq!(hands.switch(), Switch::Free);
+        hands.feed(&key('e', Press), Seconds(0.0));
+        hands.set_params(&Params { enable: 'j', ..params });
+        assert_eq!(hands.switch(), Switch::Free);
+        hands.feed(&key('j', Press), Seconds(0.0));
+        assert_eq!(hands.switch(), Switch::Held);
+    }
+
+    #[test]
+    fn a_letter_that_means_something_else_is_no_switch() {
+        for (letter, is_free) in [('e', true), ('a', false), ('x', false), ('E', false)] {
+            let mut faults = Vec::new();
+            Params { enable: letter, ..Params::default() }.check(&mut Checker::new(&mut faults));
+            assert_eq!(faults.is_empty(), is_free, "{letter}: {faults:?}");
+        }
+    }
+
+    fn mouse_event(kind: MouseEventKind) -> MouseEvent {
+        MouseEvent { kind, column: 3, row: 4, modifiers: KeyModifiers::NONE }
+    }
+
+    const BUTTONS: [MouseButton; 3] = [MouseButton::Left, MouseButton::Middle, MouseButton::Right];
+
+    #[test]
+    fn a_mouse_button_is_held_until_it_is_up_or_nobody_knows() {
+        use MouseEventKind::{Down, Drag, Moved, ScrollUp, Up};
+        let pointer = Pointer::default();
+        let params = crate::operator::mouse::Params::default();
+        let clock = WallClock::start();
+        let mut mouse = Mouse::new(pointer.clone(), clock, &params, 1.0, Seconds(0.02));
+        let [left, middle, right] = BUTTONS;
+        assert_eq!(mouse.switch(Seconds(0.0)), Switch::Free);
+        let mut after = |kind| {
+            point(&pointer, &mouse_event(kind), Seconds(0.0));
+            mouse.switch(Seconds(0.0))
+        };
+        assert_eq!(after(Drag(left)), Switch::Free);
+        assert_eq!(after(Down(right)), Switch::Free);
+        for kind in [Down(left), Drag(left), ScrollUp, Up(right), Down(middle), Up(middle)] {
+            assert_eq!(after(kind), Switch::Held, "{kind:?}");
+        }
+        assert_eq!(after(Up(left)), Switch::Free);
+        assert_eq!(after(Down(left)), Switch::Held);
+        assert_eq!(after(Moved), Switch::Free);
+        assert_eq!(after(Down(left)), Switch::Held);
+        pointer.rests();
+        assert_eq!(after(Drag(left)), Switch::Free);
+        // Where every button that goes up is called the left, none stays held.
+        point(&pointer, &mouse_event(Down(right)), Seconds(0.0));
+        point(&pointer, &mouse_event(Up(left)), Seconds(0.0));
+        assert!(!pointer.is_held(Button::Right));
+    }
+
+    proptest! {
+        /// After a release, a lost focus or another knowledge of releases, only a new press holds.
+        #[test]
+        fn no_order_of_keys_leaves_the_switch_held(
+            events in proptest::collection::vec((0..10_u8, any::<bool>()), 0..80),
+        ) {
+            use KeyEventKind::{Press, Release, Repeat};
+            let hands = Hands::new(&Params::default());
+            let (mut is_down, mut is_known) = (false, false);
+            for (event, is_large) in events {
+                let e = if is_large { 'E' } else { 'e' };
+                match event {
+                    0 | 1 => {
+                        hands.feed(&key(e, Press), Seconds(0.0));
+                        is_down = is_known;
+                    }
+                    2 | 3 => drop(hands.feed(&key(e, Repeat), Seconds(0.0))),
+                    4 => {
+                        hands.feed(&key(e, Release), Seconds(0.0));
+                        is_down = false;
+                    }
+                    5 => drop(hands.feed(&key('d', Press), Seconds(0.0))),
+                    6 => {
+                        // A release of any key tells that they are reported.
+                        hands.feed(&key('d', Release), Seconds(0.0));
+                        is_known = true;
+                    }
+                    7 => {
+                        hands.release_all();
+                        is_down = false;
+                    }
+                    _ => {
+                        is_known = event == 8;
+                        is_down &= is_known;
+                        hands.set_releases_known(is_known);
+                    }
+                }
+                let expected = if is_known { Switch::of(is_down) } else { Switch::None };
+                prop_assert_eq!(hands.switch(), expected);
+            }
+        }
+
+        /// A button that is up, or whose terminal lost its focus, is never held.
+        #[test]
+        fn no_order_of_mouse_events_leaves_a_button_held(
+            events in proptest::collection::vec((0..6_u8, 0..3_usize), 0..80),
+        ) {
+            let pointer = Pointer::default();
+            let mut down = [false; 3];
+            for (event, at) in events {
+                let which = BUTTONS[at];
+                let kind = match event {
+                    0 | 1 => MouseEventKind::Down(which),
+                    2 => MouseEventKind::Up(which),
+                    3 => MouseEventKind::Drag(which),
+                    4 => MouseEventKind::Moved,
+                    _ => MouseEventKind::ScrollDown,
+                };
+                if event == 5 {
+                    pointer.rests();
+                }
+                point(&pointer, &mouse_event(kind), Seconds(0.0));
+                match event {
+                    0 | 1 => down[at] = true,
+                    2 => down[at] = false,
+                    4 | 5 => down = [false; 3],
+                    _ => {}
+                }
+                for (which, is_down) in BUTTONS.into_iter().zip(down) {
+                    prop_assert!(is_down || !pointer.is_held(button(which)));
+                }
+                prop_assert!(event > 1 || pointer.is_held(button(which)));
+            }
+        }
     }
 }

@@ -174,7 +174,7 @@ impl Stage {
         order: Order,
     ) -> Result<Running, RunError> {
         // Only now is it known whose keyboard it is, for a resumed session as for a new one.
-        keys.hands.set_timing(&session.profile().operator.keyboard);
+        keys.hands.set_params(&session.profile().operator.keyboard);
         self.feed.replace(keys.hands, keys.pointer);
         let running = Running {
             info: info(&session),

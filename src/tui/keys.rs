@@ -274,6 +274,7 @@ pub fn hints(screen: Screen, hand: Hand) -> impl Iterator<Item = (&'static str, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::operator::terminal::{ENABLE_KEYS, direction};
 
     #[test]
     fn no_key_has_two_meanings_on_a_screen_and_none_is_a_steering_key() {
@@ -291,6 +292,13 @@ mod tests {
                 .concat()
         {
             assert!(of(Screen::Live).all(|binding| !binding.keys.contains(&steering)));
+        }
+        for letter in ENABLE_KEYS.chars() {
+            let (small, large) = (KeyCode::Char(letter), letter.to_ascii_uppercase());
+            for key in [small, KeyCode::Char(large)] {
+                assert!(BINDINGS.iter().all(|binding| !binding.keys.contains(&key)), "{key}");
+                assert_eq!(direction(&KeyEvent::new(key, KeyModifiers::NONE)), None, "{key}");
+            }
         }
     }
 

@@ -139,9 +139,10 @@ impl Screen {
         execute!(self.terminal.backend_mut(), EndSynchronizedUpdate)?;
         if let Some(sender) = self.sender.take() {
             let (feed, stop) = (self.feed.clone(), Arc::clone(&self.stop));
-            std::thread::Builder::new()
-                .name("coadapt-terminal".to_owned())
-                .spawn(move || read(&sender, &feed, &stop))?;
+            std::thread::Builder::new().name("coadapt-terminal".to_owned()).spawn(move || {
+                let _hands = Attended(&feed);
+                read(&sender, &feed, &stop);
+            })?;
         }
         Ok(())
     }
@@ -197,6 +198,15 @@ pub fn give_back() {
 #[must_use]
 pub fn is_taken() -> bool {
     TAKEN.load(Ordering::SeqCst)
+}
+
+/// Hands that are watched; once nobody reads any more, however that came, nothing is held.
+struct Attended<'a>(&'a Feed);
+
+impl Drop for Attended<'_> {
+    fn drop(&mut self) {
+        self.0.let_go();
+    }
 }
 
 /// The one reader of the terminal: asks what it can do, feeds the hands at once, and passes

@@ -36,6 +36,8 @@ struct Listeners {
     /// The pads that are plugged in.
     present: Vec<About>,
     outboxes: Vec<Outbox>,
+    /// When the thread looked at the pads last; `None` before it did.
+    looked_at: Option<Seconds>,
     /// Nobody wants this thread any more: another with other mappings took its place.
     is_over: bool,
 }
@@ -70,6 +72,12 @@ impl Hub {
         }
         listeners.outboxes.push(inbox.outbox());
         inbox
+    }
+
+    /// How long ago the thread looked at the pads; for ever, where it never did.
+    #[must_use]
+    pub fn age(&self, now: Seconds) -> Seconds {
+        self.listeners().looked_at.map_or(Seconds(f64::INFINITY), |at| now - at)
     }
 
     /// Lets the hand at `pad` feel something. A pad that cannot shake stays still.
@@ -167,6 +175,7 @@ mod worker {
             }
             while !self.hub.listeners().is_over {
                 let before = self.clock.now();
+                self.hub.listeners().looked_at = Some(before);
                 let next = self.gilrs.next_event_blocking(Some(PATIENCE));
                 let now = self.clock.now();
                 match next {

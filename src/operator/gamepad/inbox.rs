@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;
 
-use super::pads::Event;
+use super::pads::{Event, least};
 use crate::signal::Seconds;
 
 /// An event and when it was heard.
@@ -54,9 +54,9 @@ impl Outbox {
         let mut waiting = lock(&inbox.0);
         if !follow(&mut waiting, event, now) {
             waiting.push_back((event.clone(), now));
-            // The newest matter most: the oldest press has had its time.
             if waiting.len() > MOST {
-                waiting.pop_front();
+                let oldest = least(waiting.iter().map(|(event, _)| event));
+                waiting.remove(oldest);
             }
         }
         inbox.1.notify_one();
@@ -91,7 +91,7 @@ mod tests {
     use super::super::map::{Axis, Button};
     use super::super::pads::{About, Id, Pads};
     use super::*;
-    use crate::operator::{News, Request};
+    use crate::operator::{News, Request, Switch};
 
     #[test]
     fn nobody_listens_for_long_and_neither_the_centre_nor_the_stop_is_lost() {
@@ -128,6 +128,32 @@ mod tests {
         assert_eq!(std::iter::from_fn(|| inbox.next()).count(), MOST);
         drop(inbox);
         assert!(!outbox.put(&axis(0.0), now));
+    }
+
+    /// A press that was heard has its release still to come, whatever else fills the inbox.
+    #[test]
+    fn a_hand_that_let_go_is_never_lost_in_a_flood() {
+        let inbox = Inbox::default();
+        let outbox = inbox.outbox();
+        let now = Seconds(0.0);
+        let about = |id| {
+            let (name, mapping) = ("Pad".to_owned(), String::new());
+            Event::Connected(About { id: Id(id), name, guid: String::new(), mapping })
+        };
+        let button = |button, is_pressed| Event::Button { pad: Id(0), button, is_pressed };
+        let mut pads = Pads::new(&Params::default());
+        pads.take(about(0), now);
+        pads.take(button(Button::LeftTrigger, true), now);
+        assert_eq!(pads.switch(), Switch::Held);
+        outbox.put(&button(Button::LeftTrigger, false), now);
+        for id in 1..=u32::try_from(2 * MOST).unwrap() {
+            outbox.put(&about(id), now);
+            outbox.put(&button(Button::South, true), now);
+        }
+        while let Some((event, at)) = inbox.next() {
+            pads.take(event, at);
+        }
+        assert_eq!(pads.switch(), Switch::Free);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! A pure state machine. It hears what the pad does and asks for one thing after the other:
 //!
 //! ```text
-//! steer ─▶ begin ─▶ pause ─▶ discard ─▶ stop ─▶ done
+//! steer ─▶ begin ─▶ pause ─▶ discard ─▶ stop ─▶ enable ─▶ done
 //! ```
 //!
 //! An axis is taken once it went far out and came back to the middle: noise does not go far,
@@ -75,7 +75,7 @@ pub struct Learner {
     step: Step,
     travels: BTreeMap<Axis, Travel>,
     /// The purposes that were answered: a kept one may still give way to a pressed one.
-    pressed: [bool; 4],
+    pressed: [bool; 5],
     remark: Option<String>,
 }
 
@@ -89,7 +89,7 @@ impl Learner {
     ) -> Self {
         let travel = |(axis, at): (Axis, Option<f64>)| (axis, Travel::from(at.unwrap_or(0.0)));
         let travels = axes.into_iter().map(travel).collect();
-        Self { map, invert, step: Step::Steer, travels, pressed: [false; 4], remark: None }
+        Self { map, invert, step: Step::Steer, travels, pressed: [false; 5], remark: None }
     }
 
     /// What is asked for now.
@@ -227,7 +227,8 @@ impl Learner {
             0 => self.map.begin = button,
             1 => self.map.pause = button,
             2 => self.map.discard = button,
-            _ => self.map.stop = button,
+            3 => self.map.stop = button,
+            _ => self.map.enable = button,
         }
     }
 
@@ -270,7 +271,8 @@ pub fn meaning(purpose: &str) -> &'static str {
         "begin" => "go on, take over",
         "pause" => "pause, or go on",
         "discard" => "repeat this rollout",
-        _ => "the emergency stop",
+        "stop" => "the emergency stop",
+        _ => "a robot moves while it is held",
     }
 }
 
@@ -375,11 +377,13 @@ mod tests {
         pupil.keep();
         pupil.leave_out();
         pupil.press(Button::Code(12));
+        pupil.press(Button::RightTrigger);
         assert_eq!(pupil.step(), Step::Done);
         let expected = Map {
             begin: Some(Button::South),
             discard: None,
             stop: Some(Button::Code(12)),
+            enable: Some(Button::RightTrigger),
             ..Map::default()
         };
         assert_eq!(*pupil.map(), expected);
@@ -411,7 +415,7 @@ mod tests {
         swing(&mut pupil, Axis::Code(17), -0.9);
         let sets = pupil.sets();
         assert_eq!(sets[0], ("operator.gamepad.map.steer".to_owned(), "code(17)".to_owned()));
-        assert_eq!(sets[5].1, "true");
+        assert_eq!(sets[6].1, "true");
         assert_eq!(sets[1].1, "Some(start)");
     }
 
@@ -423,10 +427,11 @@ mod tests {
         pupil.leave_out();
         pupil.keep();
         pupil.keep();
+        pupil.keep();
         for (key, value) in pupil.sets().iter().filter(|(key, _)| key.contains("map.")) {
             let name = key.rsplit('.').next().unwrap();
             let map: Map = ron::from_str(&format!("({name}: {value})")).unwrap();
-            assert_eq!(map.buttons().len(), 4);
+            assert_eq!(map.buttons().len(), 5);
         }
     }
 }

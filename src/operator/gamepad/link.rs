@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::pads::Event;
+use super::pads::{Event, least};
 use super::relay::{self, Counts, Inlet, LONGEST_LINE};
 use crate::clock::{Clock, WallClock};
 use crate::signal::Seconds;
@@ -127,7 +127,7 @@ impl Link {
         }
     }
 
-    fn take(&self, line: &[u8], now: Seconds) {
+    pub(super) fn take(&self, line: &[u8], now: Seconds) {
         // The tick never waits for a long line to be understood.
         let line = relay::understand(String::from_utf8_lossy(line).trim_end());
         let mut state = self.state();
@@ -137,7 +137,7 @@ impl Link {
     }
 
     /// The link is down, for the reason and with the cure in `words`.
-    fn end(&self, words: &str, now: Seconds) {
+    pub(super) fn end(&self, words: &str, now: Seconds) {
         let mut state = self.state();
         let events = state.inlet.end();
         state.push(events, now);
@@ -153,8 +153,10 @@ impl State {
     fn push(&mut self, events: Vec<Event>, now: Seconds) {
         let age = self.inlet.age(now).unwrap_or(Seconds(0.0));
         self.events.extend(events.into_iter().map(|event| Relayed { event, at: now, age }));
-        let beyond = self.events.len().saturating_sub(QUEUE);
-        self.events.drain(..beyond);
+        while self.events.len() > QUEUE {
+            let oldest = least(self.events.iter().map(|relayed| &relayed.event));
+            self.events.remove(oldest);
+        }
     }
 }
 

@@ -88,6 +88,21 @@ impl fmt::Display for Button {
     }
 }
 
+impl Button {
+    /// What people call it: by what is printed on most pads, or else by its place.
+    fn printed(self) -> String {
+        match self {
+            Self::LeftTrigger => "L1".to_owned(),
+            Self::LeftTrigger2 => "L2".to_owned(),
+            Self::LeftThumb => "L3".to_owned(),
+            Self::RightTrigger => "R1".to_owned(),
+            Self::RightTrigger2 => "R2".to_owned(),
+            Self::RightThumb => "R3".to_owned(),
+            other => other.to_string(),
+        }
+    }
+}
+
 /// The word that a profile writes for `name`.
 fn word(name: &impl Serialize, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     f.write_str(&ron::to_string(name).map_err(|_| fmt::Error)?)
@@ -108,6 +123,8 @@ pub struct Map {
     pub discard: Option<Button>,
     /// The emergency stop.
     pub stop: Option<Button>,
+    /// The dead-man switch: real hardware moves only while it is held.
+    pub enable: Option<Button>,
 }
 
 impl Default for Map {
@@ -118,6 +135,7 @@ impl Default for Map {
             pause: Some(Button::Select),
             discard: Some(Button::North),
             stop: Some(Button::East),
+            enable: Some(Button::LeftTrigger),
         }
     }
 }
@@ -125,12 +143,13 @@ impl Default for Map {
 impl Map {
     /// The buttons with what they are for, as a profile names it.
     #[must_use]
-    pub const fn buttons(&self) -> [(&'static str, Option<Button>); 4] {
+    pub const fn buttons(&self) -> [(&'static str, Option<Button>); 5] {
         [
             ("begin", self.begin),
             ("pause", self.pause),
             ("discard", self.discard),
             ("stop", self.stop),
+            ("enable", self.enable),
         ]
     }
 }
@@ -150,6 +169,14 @@ impl Map {
             .filter_map(|(button, does)| button.map(|button| format!("{button} {does}")))
             .collect();
         if parts.is_empty() { String::new() } else { format!("On the pad {}.", parts.join(", ")) }
+    }
+}
+
+impl Map {
+    /// What keeps the dead-man switch held, for people; `None` without one.
+    #[must_use]
+    pub fn switch_name(&self) -> Option<String> {
+        self.enable.map(|button| format!("hold {}", button.printed()))
     }
 }
 

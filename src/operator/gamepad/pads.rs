@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Params;
 use super::map::{Axis, Button, Map};
-use crate::operator::{News, Request};
+use crate::operator::{News, Request, Switch};
 use crate::signal::Seconds;
 
 /// The number of a pad, for as long as it is plugged in.
@@ -63,6 +63,20 @@ pub enum Event {
         /// Pressed?
         is_pressed: bool,
     },
+}
+
+impl Event {
+    /// Whether it says that a hand let go of something, or that its pad is gone: lost, it would
+    /// leave a button held.
+    const fn lets_go(&self) -> bool {
+        matches!(self, Self::Disconnected(_) | Self::Button { is_pressed: false, .. })
+    }
+}
+
+/// Makes room in a queue that nobody empties: which of the `waiting` events is to be given up
+/// first. The newest matter most, and what lets go matters more than what does not.
+pub(super) fn least<'a>(waiting: impl IntoIterator<Item = &'a Event>) -> usize {
+    waiting.into_iter().position(|event| !event.lets_go()).unwrap_or(0)
 }
 
 /// Axes and buttons of one pad that are kept; no pad has more, but a broken one may say so.
@@ -188,6 +202,19 @@ impl Pads {
             Grip::Off => None,
             Grip::On => pad.axes.get(&self.map.steer).copied(),
         }
+    }
+
+    /// The dead-man switch of the pad that steers; a hand at another pad does not count.
+    #[must_use]
+    pub fn switch(&self) -> Switch {
+        let Some(enable) = self.map.enable else { return Switch::None };
+        Switch::of(self.steering().is_some_and(|pad| pad.pressed.contains(&enable)))
+    }
+
+    /// The map of axes and buttons.
+    #[must_use]
+    pub const fn map(&self) -> &Map {
+        &self.map
     }
 
     /// The time of the steering pad's last event, if it had one.

@@ -200,3 +200,47 @@ proptest! {
         prop_assert_eq!(pads.deflection(), None);
     }
 }
+
+proptest! {
+    /// Only the button of the pad in charge holds the switch, and only while it is down.
+    #[test]
+    fn no_order_of_events_leaves_the_switch_held(
+        events in proptest::collection::vec((0..8_u8, 1..4_u32), 0..80),
+    ) {
+        let mut pads = Pads::new(&Params::default());
+        let mut down = BTreeSet::new();
+        for (event, id) in events {
+            let button = |button, is_pressed| Event::Button { pad: Id(id), button, is_pressed };
+            let event = match event {
+                0 => connected(id, "A"),
+                1 => Event::Disconnected(Id(id)),
+                2 | 3 => button(Button::LeftTrigger, true),
+                4 => button(Button::LeftTrigger, false),
+                5 => button(Button::Start, true),
+                6 => button(Button::Start, false),
+                _ => stick(id, 0.7),
+            };
+            match event {
+                Event::Button { button: Button::LeftTrigger, is_pressed: true, .. } => {
+                    down.insert(Id(id));
+                }
+                Event::Button { button: Button::LeftTrigger, .. } | Event::Disconnected(_) => {
+                    down.remove(&Id(id));
+                }
+                _ => {}
+            }
+            pads.take(event, NOW);
+            let charge = pads.steering().map(|pad| pad.about.id);
+            let may_be_held = charge.is_some_and(|id| down.contains(&id));
+            prop_assert!(may_be_held || pads.switch() == Switch::Free);
+        }
+        // The pad in charge has its switch at hand again.
+        if let Some(Id(id)) = pads.steering().map(|pad| pad.about.id) {
+            let [press, release] = press(id, Button::LeftTrigger);
+            pads.take(press, NOW);
+            prop_assert_eq!(pads.switch(), Switch::Held);
+            pads.take(release, NOW);
+            prop_assert_eq!(pads.switch(), Switch::Free);
+        }
+    }
+}

@@ -133,6 +133,18 @@ impl Source {
         self.link()?.age(self.now(now))
     }
 
+    /// Whether what happens at the pads is still told: neither a relay nor the thread
+    /// that hears them has been silent for longer than `patience`.
+    pub(super) fn is_heard(&self, patience: Seconds) -> bool {
+        let age = match &self.kind {
+            Kind::Here { hub, clock, .. } => Some(hub.age(clock.now())),
+            Kind::Relay { link, clock, .. } => link.age(clock.now()),
+            Kind::Script(_) => Some(Seconds(0.0)),
+            Kind::Nothing(_) => None,
+        };
+        age.is_some_and(|age| age <= patience)
+    }
+
     /// How the link does.
     pub(super) fn words(&self, now: Seconds) -> String {
         let (Some(link), Some(age)) = (self.link(), self.age(now)) else { return String::new() };

@@ -1,11 +1,11 @@
 //! Where the pointer is and how fast it moves, from its events with their times; no clock in
 //! here.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::Along;
+use super::{Along, Button};
 use crate::signal::Seconds;
 
 /// How finely the pointer is known: the screen's width and height, in pixels or cells.
@@ -82,6 +82,8 @@ struct Track {
     is_out: bool,
     /// Where it was from when on, as far as it moved without a break; oldest first.
     way: VecDeque<(Place, Seconds)>,
+    /// The buttons that are held.
+    held: BTreeSet<Button>,
 }
 
 impl Track {
@@ -145,11 +147,39 @@ impl Pointer {
         self.track().moves_to(column, row, at);
     }
 
-    /// It is out of sight: at rest, and wherever it turns up again, it did not move there.
+    /// It is out of sight: at rest, and wherever it turns up again, it did not move there. No
+    /// hand is on its buttons.
     pub fn rests(&self) {
         let mut track = self.track();
         track.breaks_off();
         track.is_out = true;
+        track.held.clear();
+    }
+
+    /// A button went down.
+    pub fn press(&self, button: Button) {
+        self.track().held.insert(button);
+    }
+
+    /// A button went up. Old terminals call each one the left, so that with the left all go.
+    pub fn release(&self, button: Button) {
+        match button {
+            Button::Left => self.release_all(),
+            other => {
+                self.track().held.remove(&other);
+            }
+        }
+    }
+
+    /// No button is held.
+    pub fn release_all(&self) {
+        self.track().held.clear();
+    }
+
+    /// Whether a button is held: it went down, and nothing since tells that it may be up.
+    #[must_use]
+    pub fn is_held(&self, button: Button) -> bool {
+        self.track().held.contains(&button)
     }
 
     /// The time of its last event, if there was one.

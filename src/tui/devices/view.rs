@@ -386,7 +386,8 @@ fn about_pad(pen: &mut Pen<'_>, pad: &Gamepad, map: &Map, others: usize) {
         1 => "; 1 more pad waits".to_owned(),
         _ => format!("; {others} more pads wait"),
     };
-    note(pen, 0, 5, pen.width(), &format!("held {held}{more}"), Role::Text);
+    // Long names take a third row.
+    note(pen, 0, (y + 1).max(5), pen.width(), &format!("held {held}{more}"), Role::Text);
 }
 
 /// Where the axes are, the one that steers first.
@@ -450,9 +451,10 @@ fn told(problem: &Problem, width: usize) -> Vec<(String, Role)> {
 
 /// What is asked to learn a map, and what was learned.
 fn learning(learner: &Learner, width: usize) -> Vec<(String, Role)> {
+    let steps = 1 + learner.map().buttons().len();
     let step = match learner.step() {
-        Step::Steer => "1 of 5: ".to_owned(),
-        Step::Button(at) => format!("{} of 5: ", at + 2),
+        Step::Steer => format!("1 of {steps}: "),
+        Step::Button(at) => format!("{} of {steps}: ", at + 2),
         Step::Done => String::new(),
     };
     let mut lines = vec![(step + &learner.question(), Role::Strong)];

@@ -59,13 +59,16 @@ impl Feed {
                 }
                 hands.feed(key, self.clock.now());
             }
-            Event::FocusLost => {
-                self.hands().release_all();
-                self.pointer().rests();
-            }
+            Event::FocusLost => self.let_go(),
             Event::Resize(columns, rows) if capture::is_on() => self.fit((*columns, *rows)),
             _ => {}
         }
+    }
+
+    /// No hand is on keys or mouse, as far as anyone can tell.
+    pub(super) fn let_go(&self) {
+        self.hands().release_all();
+        self.pointer().rests();
     }
 
     /// Fits the pointer's places to a screen of `size`, columns and rows.
