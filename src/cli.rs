@@ -322,8 +322,7 @@ fn bytes(text: &str) -> Result<Box<[u8]>, String> {
         [_, _] if pair.iter().all(u8::is_ascii_hexdigit) => std::str::from_utf8(pair).ok(),
         _ => None,
     });
-    let bytes: Option<Box<[u8]>> =
-        pairs.map(|pair| u8::from_str_radix(pair?, 16).ok()).collect();
+    let bytes: Option<Box<[u8]>> = pairs.map(|pair| u8::from_str_radix(pair?, 16).ok()).collect();
     bytes.filter(|bytes| !bytes.is_empty()).ok_or_else(|| "give bytes, such as aa0508".to_owned())
 }
 

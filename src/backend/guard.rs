@@ -41,7 +41,9 @@ const FAREWELL: Duration = Duration::from_millis(50);
 #[derive(Debug, thiserror::Error)]
 pub enum GuardError {
     /// The program to start is not known.
-    #[error("the motor's guard is this program once more, whose file is not found ({0}): start coadapt anew")]
+    #[error(
+        "the motor's guard is this program once more, whose file is not found ({0}): start coadapt anew"
+    )]
     NoProgram(io::Error),
     /// The system starts no process.
     #[error("the motor's guard could not be started ({0}): end other programs, then try again")]
@@ -94,7 +96,8 @@ impl Guard {
         stop: &[u8],
         patience: Seconds,
     ) -> Result<Self, GuardError> {
-        let (process, line) = spawn(program, &port, stop, patience).map_err(GuardError::NotStarted)?;
+        let (process, line) =
+            spawn(program, &port, stop, patience).map_err(GuardError::NotStarted)?;
         Ok(Self {
             process: Some(process),
             line,

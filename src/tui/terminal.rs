@@ -147,7 +147,10 @@ impl Screen {
             return Ok(());
         }
         if BLANK.swap(false, Ordering::SeqCst) {
-            self.terminal.clear()?;
+            // A new size is painted in full, even the same one; clearing would first ask the
+            // terminal where its cursor is, and the answer is among the keys.
+            let size = self.terminal.size()?;
+            self.terminal.resize(size.into())?;
         }
         queue!(self.terminal.backend_mut(), BeginSynchronizedUpdate)?;
         self.terminal.draw(picture)?;

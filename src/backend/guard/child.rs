@@ -18,9 +18,8 @@ use crate::clock::{Clock, WallClock};
 use crate::signal::Seconds;
 
 /// What ends or stops the program that is guarded must not reach the guard.
-const DEAF_TO: [i32; 10] = [
-    SIGALRM, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2,
-];
+const DEAF_TO: [i32; 10] =
+    [SIGALRM, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2];
 /// The guard's sign of life.
 const READY: u8 = b'r';
 
@@ -74,6 +73,8 @@ fn listen(bytes: &mut [u8], patience: Option<Seconds>) -> Vec<Heard> {
     match rustix::io::read(beats, &mut *bytes) {
         Err(Errno::INTR | Errno::AGAIN) => Vec::new(),
         Ok(0) | Err(_) => vec![Heard::End],
-        Ok(len) => bytes[..len].iter().filter_map(|byte| Watch::of(*byte)).map(Heard::Beat).collect(),
+        Ok(len) => {
+            bytes[..len].iter().filter_map(|byte| Watch::of(*byte)).map(Heard::Beat).collect()
+        }
     }
 }
