@@ -107,19 +107,14 @@ impl Vigil {
 
     /// What to do at `now`; after each deed this is to be asked again.
     pub fn act(&mut self, now: Seconds) -> Act {
-        if let Some(due) = self.due()
-            && now >= due
-        {
+        self.burst = self.burst.filter(|burst| now < burst.until);
+        if self.due().is_some_and(|due| now >= due) {
             self.beat = None;
             self.stop_if_armed(now);
         }
-        match &mut self.burst {
-            Some(burst) if now >= burst.until => self.burst = None,
-            Some(burst) if now >= burst.next => {
-                burst.next = now + EVERY;
-                return Act::Stop;
-            }
-            _ => {}
+        if let Some(burst) = self.burst.as_mut().filter(|burst| now >= burst.next) {
+            burst.next = now + EVERY;
+            return Act::Stop;
         }
         let next = self.burst.map(|burst| burst.next);
         match (self.is_alone, next) {
@@ -211,7 +206,7 @@ mod tests {
         night.hear(Heard::Beat(Watch::Idle));
         night.hear(Heard::End);
         assert!(night.has_left);
-        assert_eq!(night.stops, []);
+        assert!(night.stops.is_empty(), "{:?}", night.stops);
     }
 
     #[test]
@@ -242,7 +237,7 @@ mod tests {
         // It went on after all, and is silent again.
         night.stops.clear();
         night.beats(Watch::Armed, 0.5);
-        assert_eq!(night.stops, []);
+        assert!(night.stops.is_empty(), "{:?}", night.stops);
         night.pass(0.2);
         assert!(!night.stops.is_empty());
         // Killed while it was stopped.
@@ -273,7 +268,7 @@ mod tests {
         night.pass(20.0);
         night.hear(Heard::End);
         assert!(night.has_left);
-        assert_eq!(night.stops, []);
+        assert!(night.stops.is_empty(), "{:?}", night.stops);
     }
 
     #[test]
@@ -282,7 +277,7 @@ mod tests {
         night.pass(10.0);
         night.hear(Heard::End);
         assert!(night.has_left);
-        assert_eq!(night.stops, []);
+        assert!(night.stops.is_empty(), "{:?}", night.stops);
     }
 
     #[test]
