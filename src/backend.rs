@@ -1,6 +1,8 @@
 //! Where the plant lives: in the computer or at the end of a wire.
 
 pub mod emulator;
+#[cfg(unix)]
+pub mod guard;
 pub mod safety;
 pub mod serial;
 pub mod simulated;

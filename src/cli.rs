@@ -47,6 +47,9 @@ pub enum Command {
     PadRelay(PadRelay),
     /// A plant's device without hardware, on a pseudo-terminal, in real time.
     Emulate(Emulate),
+    /// Stops a real plant's motor when the program that started this is gone.
+    #[command(hide = true)]
+    Guard(Guard),
     /// Look at profiles.
     #[command(subcommand)]
     Profile(Profile),
@@ -264,6 +267,18 @@ pub struct Emulate {
     pub json: bool,
 }
 
+/// The words of `guard`, which only coadapt itself says: beats come on standard input, and
+/// standard output is the port.
+#[derive(Args, Debug)]
+pub struct Guard {
+    /// The bytes that stop the motor, in hexadecimal digits.
+    #[arg(long, value_name = "HEX", value_parser = bytes)]
+    pub stop: Box<[u8]>,
+    /// How long an armed program may be silent, s.
+    #[arg(long, value_name = "SECONDS", value_parser = patience)]
+    pub patience_s: f64,
+}
+
 /// The words of `profile`.
 #[derive(Debug, Subcommand)]
 pub enum Profile {
@@ -303,6 +318,20 @@ pub struct Devices {
     /// Print one JSON object instead of sentences, and show no screen.
     #[arg(long)]
     pub json: bool,
+}
+
+fn bytes(text: &str) -> Result<Box<[u8]>, String> {
+    let pairs = text.as_bytes().chunks(2).map(|pair| match pair {
+        [_, _] if pair.iter().all(u8::is_ascii_hexdigit) => std::str::from_utf8(pair).ok(),
+        _ => None,
+    });
+    let bytes: Option<Box<[u8]>> = pairs.map(|pair| u8::from_str_radix(pair?, 16).ok()).collect();
+    bytes.filter(|bytes| !bytes.is_empty()).ok_or_else(|| "give bytes, such as aa0508".to_owned())
+}
+
+fn patience(text: &str) -> Result<f64, String> {
+    let given = text.parse().ok().filter(|given| (0.01..=10.0).contains(given));
+    given.ok_or_else(|| "give 0.01 to 10".to_owned())
 }
 
 fn key_value(text: &str) -> Result<(String, String), String> {

@@ -6,8 +6,11 @@ mod devices;
 mod emulate;
 mod evaluate;
 mod fit;
+#[cfg(unix)]
+mod guard;
 pub mod outcome;
 mod pad_relay;
+mod panics;
 mod screen;
 pub mod session;
 mod shutdown;
@@ -41,6 +44,7 @@ pub enum RunError {
 /// usage or input, 128 + n ended by signal n.
 #[must_use]
 pub fn run() -> ExitCode {
+    panics::stop_the_plant_first();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -76,6 +80,12 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         #[cfg(not(unix))]
         Some(Command::Emulate(_)) => {
             Err(RunError::Usage("this system has no pseudo-terminals".to_owned()))
+        }
+        #[cfg(unix)]
+        Some(Command::Guard(words)) => guard::guard(words),
+        #[cfg(not(unix))]
+        Some(Command::Guard(_)) => {
+            Err(RunError::Usage("this system has no port to guard".to_owned()))
         }
         Some(Command::Profile(profile)) => words::profile(profile),
         Some(Command::Devices(words)) => devices::devices(words),

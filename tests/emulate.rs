@@ -115,6 +115,24 @@ impl Host {
 }
 
 #[test]
+fn it_halts_as_any_program_does() {
+    use rustix::process::{Pid, Signal, WaitOptions, kill_process, waitpid};
+    let mut command = coadapt(&["cobs-cart-pole"]);
+    // As a shell starts it: a job of its own, which the one who started it can let go on.
+    let mut process =
+        std::os::unix::process::CommandExt::process_group(&mut command, 0).spawn().unwrap();
+    let mut port = String::new();
+    BufReader::new(process.stdout.take().unwrap()).read_line(&mut port).unwrap();
+    let pid = Pid::from_child(&process);
+    kill_process(pid, Signal::TSTP).unwrap();
+    let (_, status) = waitpid(Some(pid), WaitOptions::UNTRACED).unwrap().unwrap();
+    assert!(status.stopped(), "{status:?}");
+    kill_process(pid, Signal::CONT).unwrap();
+    kill_process(pid, Signal::TERM).unwrap();
+    assert_eq!(process.wait().unwrap().code(), Some(143));
+}
+
+#[test]
 fn the_physical_cart_pole_streams_obeys_and_holds_when_its_host_is_gone() {
     let mut device = Device::start("physical-cart-pole", "(garbage_at_connect: 50)");
     device.trace_to("port");

@@ -352,6 +352,23 @@ fn a_closed_terminal_ends_a_session_as_a_hang_up_does() {
 }
 
 #[test]
+fn a_halt_gives_the_terminal_back_and_takes_it_again() {
+    let mut terminal = live(Answers::WithKitty);
+    terminal.shows_that("the question is over", |_| terminal.wrote("\x1b[>"));
+    // Nobody could let a program go on that is alone at its terminal, so that it does at once.
+    terminal.signal("TSTP");
+    terminal.shows_that("the terminal back", |_| terminal.wrote("\x1b[?1049l"));
+    terminal.goes();
+    terminal.keys("\x1b[C");
+    terminal.shows_that("a push to the right", |screen| push(screen) == Some(5.0));
+    terminal.keys("\x1b[1;1:3C");
+    terminal.shows_that("no push", |screen| push(screen) == Some(0.0));
+    end(&terminal);
+    assert_eq!(terminal.code(), 0);
+    terminal.is_given_back();
+}
+
+#[test]
 fn signals_end_the_set_up_too() {
     for (signal, code) in [("TERM", 143), ("HUP", 129), ("INT", 130)] {
         let mut terminal = Seat::default().open("");

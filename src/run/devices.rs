@@ -7,15 +7,13 @@ use std::io::{self, IsTerminal};
 use std::panic::{self, AssertUnwindSafe};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::PoisonError;
 
 use serde::Serialize;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use super::screen::{LAST_WORDS, keep_panics_off_the_screen};
 use super::shutdown::Shutdown;
 use super::words::{document, read};
-use super::{RunError, say, signal_code, tell};
+use super::{RunError, panics, say, signal_code};
 use crate::backend::serial::ports;
 use crate::cli;
 use crate::clock::{Clock, WallClock};
@@ -174,7 +172,6 @@ fn on_screen(
     }
     let heard = hub.as_ref().ok().map(|hub| hub.listen(clock.now()));
     let mut here = Here { computer, heard, shutdown: Shutdown::listen() };
-    keep_panics_off_the_screen();
     let mut screen =
         Screen::take(feed, KeysFrom::Input).map_err(|error| RunError::Usage(error.to_string()))?;
     let ended =
@@ -182,9 +179,7 @@ fn on_screen(
     // A terminal that is gone lets even its farewell fail.
     let _ = panic::catch_unwind(AssertUnwindSafe(|| drop(screen)));
     give_back();
-    if let Some(words) = LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner).take() {
-        tell(&words);
-    }
+    panics::tell_last_words();
     Ok(match ended {
         Ok(End::Quit) => ExitCode::SUCCESS,
         Ok(End::Interrupted) => signal_code(SIGINT),

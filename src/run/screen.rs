@@ -4,10 +4,10 @@
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use super::outcome::Finished;
+use super::panics::{self, tell_later};
 use super::session::{Company, Keys, Session};
 use super::shutdown::Shutdown;
 use super::{RunError, exit_code, sentences, signal_code, tell};
@@ -30,13 +30,10 @@ use crate::tui::live::Info;
 use crate::tui::results;
 use crate::tui::scene::{self, Scene};
 use crate::tui::setup::Shelf;
-use crate::tui::terminal::{Feed, KeysFrom, Mouse, Screen, give_back, inside, is_taken};
+use crate::tui::terminal::{Feed, KeysFrom, Mouse, Screen, give_back, inside};
 
 /// The folder of local profiles.
 const PROFILES: &str = "profiles";
-
-/// What a panic said while the screen was up, kept until the terminal is given back.
-pub(super) static LAST_WORDS: Mutex<Option<String>> = Mutex::new(None);
 
 /// Opens the set-up screen, or the session that the command line asks for.
 pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
@@ -63,7 +60,6 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
             Start::Live(Box::new(started))
         }
     };
-    keep_panics_off_the_screen();
     let mut screen = match Screen::take(feed, keys) {
         Ok(screen) => screen,
         Err(error) => {
@@ -77,9 +73,7 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
     // A terminal that is gone lets even its farewell fail.
     let _ = panic::catch_unwind(AssertUnwindSafe(|| drop(screen)));
     give_back();
-    if let Some(words) = LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner).take() {
-        tell(&words);
-    }
+    panics::tell_last_words();
     let ended = match ended {
         Ok(ended) => ended.map_err(RunError::Failed)?,
         Err(_) => {
@@ -112,26 +106,6 @@ fn keys_of(run: Option<&cli::Run>) -> KeysFrom {
         Some(Choice::Gamepad(Via::RelayInput)) => KeysFrom::Terminal,
         _ => KeysFrom::Input,
     }
-}
-
-/// A panic may say its words only after the terminal was given back.
-pub(super) fn keep_panics_off_the_screen() {
-    let previous = panic::take_hook();
-    panic::set_hook(Box::new(move |info| {
-        if is_taken() {
-            let name = std::thread::current().name().unwrap_or("unnamed").to_owned();
-            let words = format!("the thread {name} panicked: {info}");
-            tell_later(&words);
-        } else {
-            previous(info);
-        }
-    }));
-}
-
-/// Keeps words until the terminal was given back.
-fn tell_later(words: &str) {
-    let mut last = LAST_WORDS.lock().unwrap_or_else(PoisonError::into_inner);
-    *last = Some(last.take().map_or_else(|| words.to_owned(), |first| format!("{first}\n{words}")));
 }
 
 /// The conductor of the screens.

@@ -1,13 +1,15 @@
-//! Signals: they end the session the way a key does.
+//! Signals: a real plant stops, then the session ends the way a key ends it, or halts.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGTTIN};
 use signal_hook::iterator::Signals;
+use signal_hook::low_level::{emulate_default_handler, raise, signal_name};
 
+use crate::backend::guard::last_resort;
 use crate::control::snapshot::{Command, Watcher};
-use crate::tui::terminal::give_back;
+use crate::tui::terminal::{give_back, is_taken, take_again};
 
 /// Remembers the signal that asked the program to end.
 #[derive(Clone, Debug, Default)]
@@ -17,18 +19,22 @@ pub struct Shutdown {
 }
 
 impl Shutdown {
-    /// Listens to INT, TERM and HUP from now on.
+    /// Listens to INT, TERM, HUP and TSTP from now on.
     #[must_use]
     pub fn listen() -> Self {
         let shutdown = Self::default();
-        if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP]) {
+        if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGTSTP]) {
             let heard = shutdown.clone();
             let listener = std::thread::Builder::new().name("coadapt-signals".to_owned());
             // Without a listener signals keep their default: the program ends at once,
             // and the session can be resumed.
             let _ = listener.spawn(move || {
                 for signal in signals.forever() {
-                    heard.hear(signal);
+                    last_resort::stop();
+                    match signal {
+                        SIGTSTP => halt(),
+                        _ => heard.hear(signal),
+                    }
                 }
             });
         }
@@ -63,7 +69,7 @@ impl Shutdown {
         if self.signal.swap(signal, Ordering::SeqCst) != 0 {
             // Asked twice: the terminal is given back, and the session can be resumed.
             give_back();
-            let _ = signal_hook::low_level::emulate_default_handler(signal);
+            let _ = emulate_default_handler(signal);
         }
         let session = self.sessions.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(session) = &*session {
@@ -72,7 +78,22 @@ impl Shutdown {
     }
 }
 
+/// Stands still until somebody lets the program go on, as after Ctrl-Z. A real plant has
+/// stopped before.
+fn halt() {
+    let was_taken = is_taken();
+    give_back();
+    // A command that was on its way meanwhile is not the last word.
+    last_resort::stop();
+    // It halts as TSTP does, and like it only where somebody can let the program go on: STOP
+    // would halt it for ever at a terminal without a shell.
+    let _ = raise(SIGTTIN);
+    if was_taken {
+        take_again();
+    }
+}
+
 fn interrupt(signal: i32) -> Command {
-    let name = signal_hook::low_level::signal_name(signal).unwrap_or("a signal");
+    let name = signal_name(signal).unwrap_or("a signal");
     Command::Interrupt(format!("{name} arrived"))
 }

@@ -39,6 +39,14 @@ static TAKEN: AtomicBool = AtomicBool::new(false);
 /// Whether it was told to report key releases.
 static REPORTS_RELEASES: AtomicBool = AtomicBool::new(false);
 
+/// All keys as escape codes: otherwise letters would have no releases.
+const ALL_KEYS: KeyboardEnhancementFlags = KeyboardEnhancementFlags::DISAMBIGUATE_ESCAPE_CODES
+    .union(KeyboardEnhancementFlags::REPORT_EVENT_TYPES)
+    .union(KeyboardEnhancementFlags::REPORT_ALL_KEYS_AS_ESCAPE_CODES)
+    .union(KeyboardEnhancementFlags::REPORT_ALTERNATE_KEYS);
+/// Whether the next picture must be painted in full.
+static BLANK: AtomicBool = AtomicBool::new(false);
+
 /// Why there is no screen.
 #[derive(Debug, thiserror::Error)]
 pub enum NoScreen {
@@ -129,11 +137,21 @@ impl Screen {
         }
     }
 
-    /// Draws one frame, as one synchronised update. The keys are read from the first on.
+    /// Draws one frame, as one synchronised update, while the terminal is ours. The keys are
+    /// read from the first on.
     ///
     /// # Errors
     /// When the terminal is gone.
     pub fn draw(&mut self, picture: impl FnOnce(&mut Frame<'_>)) -> io::Result<()> {
+        if !is_taken() {
+            return Ok(());
+        }
+        if BLANK.swap(false, Ordering::SeqCst) {
+            // A new size is painted in full, even the same one; clearing would first ask the
+            // terminal where its cursor is, and the answer is among the keys.
+            let size = self.terminal.size()?;
+            self.terminal.resize(size.into())?;
+        }
         queue!(self.terminal.backend_mut(), BeginSynchronizedUpdate)?;
         self.terminal.draw(picture)?;
         execute!(self.terminal.backend_mut(), EndSynchronizedUpdate)?;
@@ -194,6 +212,19 @@ pub fn give_back() {
     let _ = out.flush();
 }
 
+/// Takes the terminal once more that was given back only for a while. A terminal that is gone
+/// by now fails at the next picture.
+pub fn take_again() {
+    let _ = enable_raw_mode();
+    let mut out = io::stdout();
+    let _ = execute!(out, EnterAlternateScreen, cursor::Hide, EnableFocusChange);
+    if REPORTS_RELEASES.load(Ordering::SeqCst) {
+        let _ = execute!(out, PushKeyboardEnhancementFlags(ALL_KEYS));
+    }
+    BLANK.store(true, Ordering::SeqCst);
+    TAKEN.store(true, Ordering::SeqCst);
+}
+
 /// Whether the terminal is ours now.
 #[must_use]
 pub fn is_taken() -> bool {
@@ -250,12 +281,7 @@ fn report_releases(abilities: &Abilities, feed: &Feed) {
     if !abilities.key_releases || !is_taken() {
         return;
     }
-    // Without all keys as escape codes, letters would have no releases.
-    let flags = KeyboardEnhancementFlags::DISAMBIGUATE_ESCAPE_CODES
-        | KeyboardEnhancementFlags::REPORT_EVENT_TYPES
-        | KeyboardEnhancementFlags::REPORT_ALL_KEYS_AS_ESCAPE_CODES
-        | KeyboardEnhancementFlags::REPORT_ALTERNATE_KEYS;
-    if execute!(io::stdout(), PushKeyboardEnhancementFlags(flags)).is_ok() {
+    if execute!(io::stdout(), PushKeyboardEnhancementFlags(ALL_KEYS)).is_ok() {
         REPORTS_RELEASES.store(true, Ordering::SeqCst);
         feed.hands().set_releases_known(true);
     }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::backend::guard::stop_burst;
 
 fn homed() -> Lab {
     let mut lab = Lab::new(Format::Cobs1);
@@ -80,6 +81,22 @@ fn it_stops_at_once_even_while_it_homes() {
     lab.order(Order::Stop, 0.03);
     assert_eq!(lab.device.command(), 0);
     assert!(!has(lab.last(), Flags::HOMED) && !has(lab.last(), Flags::HOMING));
+}
+
+#[test]
+fn a_guards_stop_stops_it_whatever_was_said_before() {
+    let mut lab = armed();
+    // Numbers have gone on, and a command breaks off in its middle.
+    for _ in 0..10 {
+        lab.order(Order::Command(500), 0.02);
+    }
+    assert_eq!(lab.device.command(), 500);
+    let mut command = Vec::new();
+    lab.host.encode(&Order::Command(700), &mut command).unwrap();
+    lab.write(&command[..5], 0.001);
+    lab.write(&stop_burst(Format::Cobs1), 0.02);
+    assert_eq!(lab.device.command(), 0);
+    assert!(!has(lab.last(), Flags::ARMED) && !has(lab.last(), Flags::WATCHDOG));
 }
 
 #[test]

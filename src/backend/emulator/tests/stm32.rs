@@ -31,6 +31,18 @@ fn a_command_is_held_for_ever_and_acts_a_period_later() {
 }
 
 #[test]
+fn a_guards_stop_stops_it_though_a_command_broke_off() {
+    let mut lab = streaming();
+    lab.order(Order::Command(1500), 0.05);
+    assert_eq!(lab.device.command(), 1500);
+    let mut command = Vec::new();
+    lab.host.encode(&Order::Command(-1500), &mut command).unwrap();
+    lab.write(&command[..5], 0.001);
+    lab.write(&crate::backend::guard::stop_burst(Format::Sensorsini31), 0.05);
+    assert_eq!(lab.device.command(), 0);
+}
+
+#[test]
 fn a_command_towards_a_close_end_is_refused_when_it_comes_only() {
     let mut lab = Lab::new(Format::Sensorsini31);
     lab.order(Order::Home, 8.0);
