@@ -156,9 +156,9 @@ fn comes_out_right(robot: Robot) {
     assert!((0.005..0.06).contains(&went.abs()), "{robot:?}: {went}");
     let is_right = (went > 0.0) != robot.mirrored;
     if is_right {
-        lab.procedure.go_on()
+        lab.procedure.go_on();
     } else {
-        lab.procedure.no()
+        lab.procedure.no();
     }
     assert_eq!(lab.step(), Step::Limits);
     assert_eq!(lab.procedure.result(), None);
@@ -171,9 +171,9 @@ fn comes_out_right(robot: Robot) {
     found.apply(&mut corrected.scales);
     let mut bench = Bench::of(&corrected, Emulator::new(&robot.device(), &Faults::default(), 1));
     if robot.homing {
-        bench.home()
+        bench.home();
     } else {
-        bench.go(1.5)
+        bench.go(1.5);
     }
     bench.driver.arm(bench.now).unwrap();
     bench.wish = Some(0.3 * LIMIT);
@@ -188,7 +188,9 @@ fn comes_out_right(robot: Robot) {
 
 #[test]
 fn the_usual_robot_is_calibrated() {
-    FORMATS.into_iter().for_each(|format| comes_out_right(Robot::usual(format)));
+    for format in FORMATS {
+        comes_out_right(Robot::usual(format));
+    }
 }
 
 #[test]
@@ -360,6 +362,9 @@ fn a_hard_limit_beyond_the_track_is_refused() {
 
 #[test]
 fn a_prompt_fits_two_lines_of_76_characters() {
+    use Trouble::{
+        Cancelled, HomingRefused, HungStill, Limits, MayNotMove, NotHomed, StoodStill, ZeroLost,
+    };
     let mut procedure = Procedure::new(&driver::Params::default(), about());
     let mut params = driver::Params::default();
     (params.safety.soft_limit_m, params.safety.hard_limit_m) = (99.0, 100.0);
@@ -385,9 +390,6 @@ fn a_prompt_fits_two_lines_of_76_characters() {
             stages.push(Stage::Steady { rest, lacks: lacks(room, motor) });
         }
     }
-    use Trouble::{
-        Cancelled, HomingRefused, HungStill, Limits, MayNotMove, NotHomed, StoodStill, ZeroLost,
-    };
     stages.extend(
         [Cancelled, MayNotMove, HomingRefused, NotHomed, ZeroLost, StoodStill, HungStill, Limits]
             .map(Stage::Failed),
