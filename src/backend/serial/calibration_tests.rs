@@ -455,10 +455,10 @@ proptest! {
         noise in prop::collection::vec(-1.9..1.9_f64, 1..50),
     ) {
         let mut rest = Rest::of(turn);
-        for (k, off) in noise.iter().enumerate() {
+        for (k, off) in (0_u32..).zip(&noise) {
             #[expect(clippy::cast_possible_truncation, reason = "some thousand counts")]
             let reading = around((at + off).round(), turn).round() as i32;
-            rest.see(reading, Seconds(k as f64));
+            rest.see(reading, Seconds(f64::from(k)));
         }
         let apart = around(rest.mean() - at, turn);
         prop_assert!(apart.abs() < 4.0, "{}", apart);
