@@ -156,9 +156,9 @@ fn comes_out_right(robot: Robot) {
     assert!((0.005..0.06).contains(&went.abs()), "{robot:?}: {went}");
     let is_right = (went > 0.0) != robot.mirrored;
     if is_right {
-        lab.procedure.go_on()
+        lab.procedure.go_on();
     } else {
-        lab.procedure.no()
+        lab.procedure.no();
     }
     assert_eq!(lab.step(), Step::Limits);
     assert_eq!(lab.procedure.result(), None);
@@ -172,9 +172,9 @@ fn comes_out_right(robot: Robot) {
     let mut bench =
         Bench::of(&corrected, PERIOD, Emulator::new(&robot.device(), &Faults::default(), 1));
     if robot.homing {
-        bench.home()
+        bench.home();
     } else {
-        bench.go(1.5)
+        bench.go(1.5);
     }
     bench.driver.arm(bench.now).unwrap();
     bench.wish = Some(0.3 * LIMIT);
@@ -189,7 +189,9 @@ fn comes_out_right(robot: Robot) {
 
 #[test]
 fn the_usual_robot_is_calibrated() {
-    FORMATS.into_iter().for_each(|format| comes_out_right(Robot::usual(format)));
+    for format in FORMATS {
+        comes_out_right(Robot::usual(format));
+    }
 }
 
 #[test]
@@ -361,6 +363,9 @@ fn a_hard_limit_beyond_the_track_is_refused() {
 
 #[test]
 fn a_prompt_fits_two_lines_of_76_characters() {
+    use Trouble::{
+        Cancelled, HomingRefused, HungStill, Limits, MayNotMove, NotHomed, StoodStill, ZeroLost,
+    };
     let mut procedure = Procedure::new(&Params::default(), about());
     let mut params = Params::default();
     (params.safety.soft_limit_m, params.safety.hard_limit_m) = (99.0, 100.0);
@@ -386,9 +391,6 @@ fn a_prompt_fits_two_lines_of_76_characters() {
             stages.push(Stage::Steady { rest, lacks: lacks(room, motor) });
         }
     }
-    use Trouble::{
-        Cancelled, HomingRefused, HungStill, Limits, MayNotMove, NotHomed, StoodStill, ZeroLost,
-    };
     stages.extend(
         [Cancelled, MayNotMove, HomingRefused, NotHomed, ZeroLost, StoodStill, HungStill, Limits]
             .map(Stage::Failed),
@@ -454,10 +456,10 @@ proptest! {
         noise in prop::collection::vec(-1.9..1.9_f64, 1..50),
     ) {
         let mut rest = Rest::of(turn);
-        for (k, off) in noise.iter().enumerate() {
+        for (k, off) in (0_u32..).zip(&noise) {
             #[expect(clippy::cast_possible_truncation, reason = "some thousand counts")]
             let reading = around((at + off).round(), turn).round() as i32;
-            rest.see(reading, Seconds(k as f64));
+            rest.see(reading, Seconds(f64::from(k)));
         }
         let apart = around(rest.mean() - at, turn);
         prop_assert!(apart.abs() < 4.0, "{}", apart);

@@ -306,14 +306,18 @@ mod tests {
 
     #[test]
     fn a_swinging_pole_comes_to_rest_in_the_middle_within_15_s() {
-        FORMATS.into_iter().for_each(|format| Robot::usual(format).swings_out());
+        for format in FORMATS {
+            Robot::usual(format).swings_out();
+        }
     }
 
     #[test]
     fn a_robot_at_another_rate_with_more_friction_comes_to_rest_as_well() {
         let mut rig = rig::Params::default();
         (rig.motor.friction_forward, rig.motor.friction_backward) = (0.045, 0.05);
-        FORMATS.into_iter().for_each(|format| Robot::new(format, rig.clone(), 10).swings_out());
+        for format in FORMATS {
+            Robot::new(format, rig.clone(), 10).swings_out();
+        }
     }
 
     #[test]
