@@ -5,6 +5,7 @@ pub mod address;
 mod bench;
 pub mod calibration;
 pub mod centre;
+pub mod desk;
 pub mod driver;
 mod greeting;
 mod params;
@@ -13,5 +14,7 @@ pub mod port;
 pub mod ports;
 pub mod scales;
 pub mod shelf;
+pub mod standing;
+pub mod station;
 
 pub use params::Params;

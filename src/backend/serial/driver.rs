@@ -13,23 +13,12 @@
 
 use super::Params;
 use super::greeting::{Greeting, Progress};
-use super::scales::Tracker;
+use super::scales::{self, Tracker};
+use super::standing::stopped_by;
+pub use super::standing::{NotArmed, Stage, Stopped};
 use crate::backend::safety::warden::{Fault, Observation, Standing, Wanted, Warden};
 use crate::backend::wire::{Codec, Counts, Flags, Format, Message, Order, Outcome, StateFrame};
 use crate::signal::{Seconds, State};
-
-/// How far a device has come.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Stage {
-    /// No device, for this reason.
-    Closed(String),
-    /// It is being greeted.
-    Opening,
-    /// It sends states and takes commands, if armed.
-    Ready,
-    /// It looks for its ends, deaf and dumb.
-    Homing,
-}
 
 /// Within this time a burst of stops is enough.
 const BURST: Seconds = Seconds(0.005);
@@ -40,19 +29,6 @@ const STUCK: &str = "homing does not end: switch the motor's supply off, then lo
     cart is stuck";
 /// A stop that the device has not confirmed after so many periods is said to be unconfirmed.
 const CONFIRMED_WITHIN: f64 = 3.0;
-
-/// Whether the device has said that its motor is off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stopped {
-    /// Nobody asked.
-    No,
-    /// It was told, and may not have answered yet.
-    Told,
-    /// It holds 0.
-    Confirmed,
-    /// It was told and does not say so.
-    Unconfirmed,
-}
 
 /// The host's side of one device.
 #[expect(
@@ -87,6 +63,10 @@ pub struct Driver {
     /// The latest state as it was on the wire.
     frame: Option<StateFrame>,
     out: Vec<u8>,
+    /// States that came,
+    states: u64,
+    /// and those that are missing.
+    lost: u64,
 }
 
 impl Driver {
@@ -114,6 +94,8 @@ impl Driver {
             stopped: Stopped::No,
             burst: None,
             damaged: 0,
+            states: 0,
+            lost: 0,
             frame: None,
             out: Vec::new(),
         }
@@ -326,6 +308,25 @@ impl Driver {
         self.frame.as_ref()
     }
 
+    /// The states that came so far, of this and earlier connections.
+    #[must_use]
+    pub const fn states(&self) -> u64 {
+        self.states
+    }
+
+    /// The states that, by the device's own time, came from it and not to us.
+    #[must_use]
+    pub const fn lost_states(&self) -> u64 {
+        self.lost
+    }
+
+    /// From now on readings mean this. Not for an armed plant, which would jump.
+    pub fn set_scales(&mut self, scales: &scales::Params) {
+        self.params.scales = scales.clone();
+        self.tracker = Tracker::new(scales.clone(), self.period);
+        self.warden.forget();
+    }
+
     /// What became of the bytes so far.
     #[must_use]
     pub fn counts(&self) -> Counts {
@@ -371,6 +372,7 @@ impl Driver {
             }
             Stage::Ready => {
                 self.frame = Some(*frame);
+                self.count(device);
                 self.speed = state.get(1).copied().unwrap_or(0.0);
                 let held = Some(i64::from(frame.command));
                 let stopped = self.stopped_itself(frame);
@@ -389,6 +391,19 @@ impl Driver {
                 }
             }
             _ => {}
+        }
+    }
+
+    /// Counts the state that came at the device's time `at`, and those that are missing before it.
+    fn count(&mut self, at: Seconds) {
+        self.states += 1;
+        let before = self.warden.latest().and_then(|seen| seen.device);
+        let periods = before.map_or(1.0, |before| ((at - before).0 / self.period.0).round());
+        // Of longer gaps the device knows nothing: it started anew, or its clock did.
+        if (2.0..=50.0).contains(&periods) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "2 to 50")]
+            let missing = periods as u64 - 1;
+            self.lost += missing;
         }
     }
 
@@ -499,34 +514,6 @@ impl Driver {
         // What cannot be said is refused by the profile's checks long before.
         let _ = self.codec.encode(order, &mut self.out);
     }
-}
-
-/// Why the motor stays off.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum NotArmed {
-    /// No device, or one that is busy.
-    #[error("the device is not ready")]
-    NotReady,
-    /// It does not know its ends.
-    #[error("the device is not homed: home it first")]
-    NotHomed,
-    /// Its motor is on.
-    #[error("the motor is not off yet")]
-    Moving,
-    /// Something is wrong.
-    #[error(transparent)]
-    Fault(#[from] Fault),
-}
-
-/// That a device stopped by itself, and why.
-fn stopped_by(flags: Flags) -> Option<&'static str> {
-    [
-        (Flags::WATCHDOG, "its watchdog missed our commands"),
-        (Flags::ESTOP, "its emergency stop is pressed"),
-        (Flags::SENSOR_FAULT, "a sensor does not answer"),
-    ]
-    .into_iter()
-    .find_map(|(flag, why)| flags.has(flag).then_some(why))
 }
 
 #[cfg(test)]
