@@ -200,7 +200,8 @@ fn spawn(
 
 /// Bytes as words of a command line.
 fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 0xf]);
+    digits.filter_map(|digit| char::from_digit(digit.into(), 16)).collect()
 }
 
 /// Writes a stop to a port that others write to as well, without waiting for a device that takes

@@ -45,7 +45,9 @@ pub fn keep_watch(stop: &[u8], patience: Seconds) -> io::Result<()> {
                 let mut bytes = [0; 4096];
                 let heard = listen(&mut bytes, left);
                 let now = clock.now();
-                heard.into_iter().for_each(|heard| vigil.hear(heard, now));
+                for heard in heard {
+                    vigil.hear(heard, now);
+                }
             }
             Act::Wait(until) => clock.wait_until(until),
             // The next one may get through.
