@@ -20,6 +20,20 @@ pub struct Sensed {
     pub age: Seconds,
 }
 
+/// Whether a rollout may go on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Readiness {
+    /// It may.
+    Ready,
+    /// It has to wait, and this is why.
+    Waits {
+        /// In words for the person.
+        why: String,
+        /// Whether only a person can end the waiting.
+        needs_person: bool,
+    },
+}
+
 /// A plant that can be sensed and driven.
 pub trait Backend: Send {
     /// The latest state; never blocks.
@@ -38,4 +52,33 @@ pub trait Backend: Send {
     /// The plant goes on where it is, but its chance is that of the rollout `place` from
     /// now on.
     fn go_on(&mut self, place: Place);
+
+    /// Whether a rollout may go on, or its countdown. A plant in the computer is always ready.
+    fn readiness(&mut self) -> Readiness {
+        Readiness::Ready
+    }
+
+    /// Whether the plant is where the rollout that was prepared begins.
+    fn is_at_start(&mut self) -> bool {
+        true
+    }
+
+    /// A hand is on the switch that enables the motor, or is not; `None`: the operator's device has
+    /// no such switch.
+    fn enable(&mut self, _is_held: Option<bool>) {}
+
+    /// The emergency stop: the plant stops at once, and until a person has seen to it.
+    fn stop(&mut self) {
+        self.halt();
+    }
+
+    /// Why the plant has stopped by itself, until a person has seen to it.
+    fn fault(&mut self) -> Option<String> {
+        None
+    }
+
+    /// Whether it is a plant that keeps its own time.
+    fn is_real(&self) -> bool {
+        false
+    }
 }

@@ -80,7 +80,8 @@ pub struct Run {
     /// or `none`.
     #[arg(long, value_name = "OPERATOR", default_value = "keyboard")]
     pub operator: String,
-    /// simulated.
+    /// simulated, or serial:PORT for a real plant: a path, a name in /dev/serial/by-id, or
+    /// usb:VID:PID[:SERIAL].
     #[arg(long, value_name = "BACKEND", default_value = "simulated")]
     pub backend: String,
     /// Some of introduction,main,autonomous.
@@ -112,6 +113,10 @@ pub struct Run {
     /// No screen, as fast as the machine goes.
     #[arg(long)]
     pub headless: bool,
+    /// Arm a real plant without a screen. Its motor moves: stay beside it, with a hand on its power
+    /// switch.
+    #[arg(long, requires = "headless")]
+    pub arm: bool,
     /// Print one JSON object instead of sentences.
     #[arg(long, requires = "headless")]
     pub json: bool,

@@ -8,8 +8,9 @@ use crate::signal::Seconds;
 pub trait Clock: Send {
     /// The time since the clock started.
     fn now(&self) -> Seconds;
-    /// Returns at `deadline` or, when that has passed, at once.
-    fn wait_until(&mut self, deadline: Seconds);
+    /// Returns at `deadline` or, when that has passed, at once; and tells when whatever was waited
+    /// for was due. A device's clock waits for its next state, and at `deadline` one is expected.
+    fn wait_until(&mut self, deadline: Seconds) -> Seconds;
     /// Whether the time is that of the wall, so that people and devices can take part.
     fn is_wall(&self) -> bool;
 }
@@ -36,11 +37,12 @@ impl Clock for WallClock {
     }
 
     #[expect(clippy::disallowed_methods, reason = "the room that waits")]
-    fn wait_until(&mut self, deadline: Seconds) {
+    fn wait_until(&mut self, deadline: Seconds) -> Seconds {
         let left = deadline - self.now();
         if left.0 > 0.0 {
             std::thread::sleep(Duration::from_secs_f64(left.0));
         }
+        deadline
     }
 
     fn is_wall(&self) -> bool {
@@ -59,10 +61,11 @@ impl Clock for VirtualClock {
         self.now
     }
 
-    fn wait_until(&mut self, deadline: Seconds) {
+    fn wait_until(&mut self, deadline: Seconds) -> Seconds {
         if deadline > self.now {
             self.now = deadline;
         }
+        deadline
     }
 
     fn is_wall(&self) -> bool {
@@ -95,11 +98,11 @@ impl Pacer {
 
     /// Waits for the next deadline; the one after it comes `period` later.
     pub fn wait(&mut self, clock: &mut dyn Clock, period: Seconds) -> Wake {
-        clock.wait_until(self.next);
-        let late = (clock.now() - self.next).0.max(0.0);
+        let due = clock.wait_until(self.next);
+        let late = (clock.now() - due).0.max(0.0);
         let missed = (late / period.0).floor();
         let lateness = Seconds(late - missed * period.0);
-        self.next = self.next + period * (missed + 1.0);
+        self.next = due + period * (missed + 1.0);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -115,10 +118,16 @@ impl Pacer {
     }
 }
 
+/// The date and time of the wall.
+#[must_use]
+pub fn today() -> jiff::Timestamp {
+    jiff::Timestamp::now()
+}
+
 /// The date and time of the wall, to the millisecond, in UTC (RFC 3339).
 #[must_use]
 pub fn timestamp() -> String {
-    jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%S%.3fZ").to_string()
+    today().strftime("%Y-%m-%dT%H:%M:%S%.3fZ").to_string()
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ mod guard;
 pub mod outcome;
 mod pad_relay;
 mod panics;
+mod plant;
 mod screen;
 pub mod session;
 mod shutdown;
@@ -94,16 +95,17 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
 
 /// A whole session on virtual time.
 fn headless(run: &crate::cli::Run) -> Result<ExitCode, RunError> {
+    let shutdown = Shutdown::listen();
+    let company = if run.arm { Company::Armed } else { Company::Headless };
     let session = if let Some(folder) = &run.resume {
-        Session::resume(folder, &Company::Headless)?
+        Session::resume(folder, &company)?
     } else {
         let order = run.order().map_err(|error| RunError::Usage(error.to_string()))?;
-        Session::begin(&order, &Company::Headless)?
+        Session::begin(&order, &company)?
     };
     for notice in &session.notices {
         tell(notice);
     }
-    let shutdown = Shutdown::listen();
     shutdown.abort_on_signal(session.watcher.clone());
     let finished = session.run(&mut VirtualClock::default(), || shutdown.signal())?;
     if run.json {

@@ -337,8 +337,8 @@ impl Clock for Person {
         self.clock.now()
     }
 
-    fn wait_until(&mut self, deadline: Seconds) {
-        self.clock.wait_until(deadline);
+    fn wait_until(&mut self, deadline: Seconds) -> Seconds {
+        let due = self.clock.wait_until(deadline);
         match self.watcher.look().stage {
             Stage::Instruction(_) | Stage::Break { .. } => {
                 assert!(self.watcher.ask(WatcherCommand::Begin));
@@ -351,6 +351,7 @@ impl Clock for Person {
             }
             _ => {}
         }
+        due
     }
 
     fn is_wall(&self) -> bool {

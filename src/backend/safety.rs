@@ -5,7 +5,7 @@
 
 pub mod warden;
 
-use super::{Backend, Sensed};
+use super::{Backend, Readiness, Sensed};
 use crate::random::Place;
 use crate::signal::{Action, Seconds, State};
 
@@ -108,6 +108,30 @@ impl Backend for Safe {
 
     fn go_on(&mut self, place: Place) {
         self.inner.go_on(place);
+    }
+
+    fn readiness(&mut self) -> Readiness {
+        self.inner.readiness()
+    }
+
+    fn is_at_start(&mut self) -> bool {
+        self.inner.is_at_start()
+    }
+
+    fn enable(&mut self, is_held: Option<bool>) {
+        self.inner.enable(is_held);
+    }
+
+    fn stop(&mut self) {
+        self.inner.stop();
+    }
+
+    fn fault(&mut self) -> Option<String> {
+        self.inner.fault()
+    }
+
+    fn is_real(&self) -> bool {
+        self.inner.is_real()
     }
 }
 

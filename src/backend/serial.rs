@@ -12,9 +12,12 @@ mod params;
 #[cfg(unix)]
 pub mod port;
 pub mod ports;
+#[cfg(unix)]
+pub mod pump;
 pub mod scales;
 pub mod shelf;
 pub mod standing;
 pub mod station;
+pub mod wired;
 
 pub use params::Params;

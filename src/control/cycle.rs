@@ -210,6 +210,7 @@ impl<W: Witness> Cycle<W> {
         self.note_lateness(wake, clock);
         self.obey();
         self.listen();
+        let waits = self.heed_backend();
         let end = match self.stage {
             Stage::Running(moment) => self.control(moment),
             Stage::Hold { moment, ticks_left } => {
@@ -218,7 +219,9 @@ impl<W: Witness> Cycle<W> {
             }
             _ => None,
         };
-        self.happen(Event::Tick(end));
+        if !waits {
+            self.happen(Event::Tick(end));
+        }
         self.heed_trip();
         self.publish();
     }
@@ -380,6 +383,7 @@ impl<W: Witness> Cycle<W> {
     /// Faster than the wall only where no hand is on the controls.
     fn speed(&self) -> f64 {
         match self.stage {
+            _ if self.crew.backend.is_real() => 1.0,
             Stage::Hold { moment, .. } | Stage::Running(moment) if !moment.phase.is_steered() => {
                 self.wanted_speed
             }

@@ -4,9 +4,9 @@ use super::cycle::{Cycle, occasion};
 use super::rollout::{Before, Mind, Rollout, WentOn};
 use super::scale;
 use super::witness::{Happening, Standing, Witness};
-use crate::backend::Backend;
+use crate::backend::{Backend, Readiness};
 use crate::learner::Learner;
-use crate::operator::{News, Practice, Request};
+use crate::operator::{News, Practice, Request, Switch};
 use crate::record::{EpisodeRow, Momentum, StepRow};
 use crate::session::machine::{self, Effect, Event, Stage};
 use crate::session::plan::Start;
@@ -21,7 +21,9 @@ impl<W: Witness> Cycle<W> {
         let (stage, effects) = machine::transition(&self.rules.plan, before, event);
         self.stage = stage;
         // The plant stops before anything that could wait for a disk.
-        if effects.contains(&Effect::Halt) {
+        if event == Event::Stop {
+            self.crew.backend.stop();
+        } else if effects.contains(&Effect::Halt) {
             self.crew.backend.halt();
         }
         if matches!((before, event), (Stage::Stopped(_), Event::Begin)) {
@@ -322,16 +324,66 @@ impl<W: Witness> Cycle<W> {
         }
     }
 
+    /// Tells the plant whether a hand is on the switch, and hears whether it is ready: true while
+    /// a countdown has to wait for it. A rollout that can no longer go on is paused.
+    pub(super) fn heed_backend(&mut self) -> bool {
+        self.crew.backend.enable(match self.crew.operator.switch(self.now()) {
+            Switch::None => None,
+            switch => Some(switch == Switch::Held),
+        });
+        let why = match self.stage {
+            Stage::Hold { .. } | Stage::Running(_) => match self.crew.backend.readiness() {
+                Readiness::Waits { why, needs_person } => Some((why, needs_person)),
+                Readiness::Ready => None,
+            },
+            _ => None,
+        };
+        let (holds, is_last) = match self.stage {
+            Stage::Hold { ticks_left, .. } => (true, ticks_left <= 1),
+            _ => (false, false),
+        };
+        match why {
+            Some((why, true)) if !self.rules.plan.attended => {
+                self.cause.get_or_insert(why);
+                self.happen(Event::Abort);
+            }
+            Some((why, _)) if holds => {
+                self.tell_waiting(Some(why));
+                return true;
+            }
+            Some((why, _)) => {
+                self.note("plant_waits", self.stage.moment(), None, why);
+                self.happen(Event::Pause);
+            }
+            None if is_last && !self.crew.backend.is_at_start() => {
+                self.tell_waiting(Some("raise the pole: it starts once it is upright".to_owned()));
+                return true;
+            }
+            None => {}
+        }
+        self.tell_waiting(None);
+        false
+    }
+
+    fn tell_waiting(&self, why: Option<String>) {
+        if let Some(publisher) = &self.crew.publisher {
+            publisher.waits(why);
+        }
+    }
+
     /// A tripped limit is an emergency stop that nobody had to press.
     pub(super) fn heed_trip(&mut self) {
-        if matches!(self.stage, Stage::Stopped(_) | Stage::Finished(_)) {
+        let is_under_way =
+            matches!(self.stage, Stage::Running(_) | Stage::Hold { .. } | Stage::Paused(_));
+        if !is_under_way {
             return;
         }
-        if let Some(trip) = self.crew.backend.tripped() {
-            self.note("tripped", self.stage.moment(), None, trip.to_string());
+        let tripped = self.crew.backend.tripped().map(|trip| trip.to_string());
+        if let Some(why) = tripped.or_else(|| self.crew.backend.fault()) {
+            self.note("tripped", self.stage.moment(), None, why.clone());
             self.happen(Event::Stop);
             if !self.rules.plan.attended {
-                self.cause.get_or_insert_with(|| trip.to_string());
+                self.cause.get_or_insert(why);
                 self.happen(Event::Abort);
             }
         }

@@ -114,6 +114,7 @@ pub enum Command {
 struct Board {
     snapshot: Mutex<Snapshot>,
     rollouts: Mutex<Vec<EpisodeRow>>,
+    waits: Mutex<Option<String>>,
 }
 
 /// The screen's end: looks and asks.
@@ -136,6 +137,7 @@ pub fn channel(stage: Stage) -> (Publisher, Watcher) {
     let board = Arc::new(Board {
         snapshot: Mutex::new(Snapshot::before(stage)),
         rollouts: Mutex::new(Vec::new()),
+        waits: Mutex::new(None),
     });
     let (sender, receiver) = sync_channel(64);
     (
@@ -149,6 +151,12 @@ impl Watcher {
     #[must_use]
     pub fn look(&self) -> Snapshot {
         *self.board.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What the countdown waits for, if it does.
+    #[must_use]
+    pub fn waits(&self) -> Option<String> {
+        self.board.waits.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Appends to `known` the rollouts that ended since it was filled last.
@@ -175,6 +183,11 @@ impl Publisher {
     /// Shows `snapshot` to whoever looks.
     pub fn publish(&self, snapshot: &Snapshot) {
         *self.board.snapshot.lock().unwrap_or_else(PoisonError::into_inner) = *snapshot;
+    }
+
+    /// Shows what the countdown waits for.
+    pub fn waits(&self, why: Option<String>) {
+        *self.board.waits.lock().unwrap_or_else(PoisonError::into_inner) = why;
     }
 
     /// Adds a rollout that ended.

@@ -136,10 +136,13 @@ impl Experiment {
         }
     }
 
-    /// Whether its plant is a cart-pole.
+    /// Its plant, if that is a cart-pole.
     #[must_use]
-    pub const fn is_cart_pole(&self) -> bool {
-        matches!(self, Self::Balance { .. } | Self::SwingUp { .. })
+    pub const fn cart_pole(&self) -> Option<&cart_pole::Params> {
+        match self {
+            Self::Balance { plant, .. } | Self::SwingUp { plant, .. } => Some(plant),
+            Self::SpeedUp { .. } | Self::MountainCar { .. } => None,
+        }
     }
 
     /// The names of the state's numbers.

@@ -128,7 +128,7 @@ macro_rules! sections {
                     );
                 }
                 c.demand(
-                    self.backend.is_none() || self.experiment.is_cart_pole(),
+                    self.backend.is_none() || self.experiment.cart_pole().is_some(),
                     "backend",
                     "a real plant",
                     "None: only the cart-pole's tasks have one",

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::RunError;
 use super::choose::{Hand, assigned_mode, cut_off_notice, order_policy, steer};
 use super::outcome::{Finished, conclude};
+use super::plant::{self, Real};
 use crate::clock::{self, Clock, WallClock};
 use crate::control::cycle::{Crew, Cycle, Rules};
 use crate::control::scribe::{Device, Origin, Scribe, standing_of};
@@ -50,6 +51,7 @@ pub struct Session {
     pub(super) sidecar: Sidecar,
     pub(super) folder: PathBuf,
     pub(super) device: Option<Device>,
+    pub(super) real: Option<Real>,
     /// Frames drawn so far, counted by the screen.
     pub frames: Arc<AtomicU64>,
     /// Looks at the session and asks things of it.
@@ -63,6 +65,8 @@ pub struct Session {
 pub enum Company {
     /// Nobody is there; virtual time.
     Headless,
+    /// Nobody is at a screen; a real plant, armed by who began it, and the wall's time.
+    Armed,
     /// A person at a screen; the wall's time.
     Attended(Keys),
 }
@@ -71,7 +75,7 @@ impl Company {
     const fn manner(&self) -> Manner {
         match self {
             Self::Headless => Manner::Virtual,
-            Self::Attended(_) => Manner::Live,
+            Self::Armed | Self::Attended(_) => Manner::Live,
         }
     }
 
@@ -82,7 +86,7 @@ impl Company {
     fn stamp(&self) -> fn() -> String {
         match self {
             Self::Headless => String::new,
-            Self::Attended(_) => clock::timestamp,
+            Self::Armed | Self::Attended(_) => clock::timestamp,
         }
     }
 }
@@ -112,13 +116,6 @@ impl Session {
     /// When the order cannot be carried out; nothing is left on the disk then.
     pub fn begin(order: &Order, company: &Company) -> Result<Self, RunError> {
         let profile = profile_of(order)?;
-        if order.backend != "simulated" {
-            return Err(RunError::Usage(format!(
-                "backend {:?} is not known; this version drives the simulated plant: \
-                 leave --backend out or give simulated",
-                order.backend
-            )));
-        }
         let seed = match order.seed {
             Some(seed) => seed,
             None => draw_seed().map_err(|error| {
@@ -140,9 +137,13 @@ impl Session {
         };
         let choice: Choice =
             order.operator.parse().map_err(|e: operator::UnknownOperator| usage(&e))?;
+        let address = plant::chosen(&order.backend, &profile, &choice, company)?;
         let hand = steer(&choice, &profile, seed, company)?;
         let plan = Plan::new(&profile.session, profile.tick(), seed, company.is_attended());
         let fresh = fresh_learner(&profile)?;
+        let real = address
+            .map(|address| Real::open(address, &profile, &choice, company, &order.logs))
+            .transpose()?;
 
         let cut_off = cut_off_notice(order, &profile);
         let unpractised = unpractised_notice(&profile, &plan);
@@ -170,7 +171,9 @@ impl Session {
             started: clock::timestamp(),
             ended: None,
             key_releases: None,
-            devices: vec![choice.to_string()],
+            devices: std::iter::once(choice.to_string())
+                .chain(real.as_ref().map(Real::name))
+                .collect(),
             host: host(),
             timing: None,
             planned: plan.phases.iter().map(|phase| phase.phase).collect(),
@@ -195,7 +198,7 @@ impl Session {
             RunError::Failed(error.to_string())
         })?;
         let learner = policy.map_or_else(|| fresh.clone(), |policy| policy.learner);
-        let parts = Parts { profile, sidecar, folder, plan, fresh, hand, recorder };
+        let parts = Parts { profile, sidecar, folder, plan, fresh, hand, real, recorder };
         let notices = cut_off.into_iter().chain(created.notice).chain(unpractised).collect();
         Ok(parts.assemble(learner, None, Vec::new(), company, notices))
     }
@@ -221,9 +224,14 @@ impl Session {
                 file.display()
             )));
         }
+        let address = plant::chosen(&sidecar.backend, &profile, &choice, company)?;
         let mut hand = steer(&choice, &profile, sidecar.seed, company)?;
         let plan = Plan::new(&profile.session, profile.tick(), sidecar.seed, company.is_attended());
         let fresh = fresh_learner(&profile)?;
+        let logs = path.ancestors().nth(2).unwrap_or(Path::new("logs"));
+        let real = address
+            .map(|address| Real::open(address, &profile, &choice, company, logs))
+            .transpose()?;
         let frozen = record::read_policy::<Model>(&path.join("policy.json")).ok();
         let resumed =
             folder.resume::<Model>(company.manner(), &(company.stamp())()).map_err(failed)?;
@@ -270,6 +278,7 @@ impl Session {
             plan,
             fresh,
             hand,
+            real,
             recorder: resumed.recorder,
         };
         let from = Some((standing, resumed.episodes));
@@ -304,7 +313,13 @@ impl Session {
         clock: &mut dyn Clock,
         signal: impl Fn() -> Option<i32>,
     ) -> Result<Finished, RunError> {
+        let mut metronome = self.real.as_ref().map(Real::metronome);
+        let clock = metronome.as_mut().map_or(clock, |metronome| metronome as &mut dyn Clock);
         let outcome = self.cycle.run(clock);
+        // The motor first, then the last files.
+        if let Some(real) = self.real {
+            real.close();
+        }
         let mut sidecar = self.sidecar;
         if let Some(device) = &self.device {
             device.tell(&mut sidecar);
@@ -322,6 +337,7 @@ struct Parts {
     plan: Plan,
     fresh: Model,
     hand: Hand,
+    real: Option<Real>,
     recorder: Recorder<Model>,
 }
 
@@ -334,7 +350,10 @@ impl Parts {
         company: &Company,
         notices: Vec<String>,
     ) -> Session {
-        let Self { profile, sidecar, folder, plan, fresh, hand, recorder } = self;
+        let Self { profile, sidecar, folder, mut plan, fresh, hand, real, recorder } = self;
+        if real.is_some() {
+            plant::waits_for_the_plant(&mut plan);
+        }
         let tick = profile.tick();
         let task = profile.experiment.task(tick);
         let origin = Origin {
@@ -361,7 +380,9 @@ impl Parts {
         };
         let crew = Crew {
             task,
-            backend: simulated_backend(&profile, sidecar.seed),
+            backend: real
+                .as_ref()
+                .map_or_else(|| simulated_backend(&profile, sidecar.seed), Real::backend),
             operator: hand.operator,
             witness: scribe,
             publisher: Some(publisher),
@@ -369,7 +390,7 @@ impl Parts {
         let cycle = Cycle::new(rules, crew, learner, from);
         let frames = Arc::default();
         let device = hand.device;
-        Session { cycle, profile, sidecar, folder, device, frames, watcher, notices }
+        Session { cycle, profile, sidecar, folder, device, real, frames, watcher, notices }
     }
 }
 

@@ -49,7 +49,9 @@ pub fn keep_watch(stop: &[u8], patience: Seconds) -> io::Result<()> {
                     vigil.hear(heard, now);
                 }
             }
-            Act::Wait(until) => clock.wait_until(until),
+            Act::Wait(until) => {
+                clock.wait_until(until);
+            }
             // The next one may get through.
             Act::Stop => drop(write_stop(stdout(), stop)),
             Act::Leave => return Ok(()),

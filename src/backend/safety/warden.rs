@@ -128,6 +128,9 @@ pub enum Fault {
     /// This computer's clock jumped, as after a sleep.
     #[error("this computer stood still for {0:.1} s: keep it from sleeping")]
     Clock(f64),
+    /// Nobody would stop the motor if this program died.
+    #[error("the motor's guard is gone: start coadapt anew")]
+    Unguarded,
     /// The device stopped by itself.
     #[error("the device stopped by itself: {0}")]
     Device(&'static str),

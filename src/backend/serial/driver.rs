@@ -230,7 +230,12 @@ impl Driver {
 
     /// The emergency stop.
     pub fn emergency(&mut self, now: Seconds) {
-        self.warden.latch(Fault::Stopped);
+        self.latch(Fault::Stopped, now);
+    }
+
+    /// Stops the motor for `fault`, which stays until a person has seen it.
+    pub fn latch(&mut self, fault: Fault, now: Seconds) {
+        self.warden.latch(fault);
         self.stop(now);
     }
 

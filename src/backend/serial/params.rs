@@ -33,6 +33,9 @@ pub struct Params {
     pub push: f64,
     /// for so long, s.
     pub push_s: f64,
+    /// A rollout that begins with the pole upright waits until it is raised to within this angle,
+    /// degrees.
+    pub upright_deg: f64,
     /// The return to the middle of the track.
     pub centre: centre::Params,
     /// From counts to the plant, and back.
@@ -56,6 +59,7 @@ impl Default for Params {
             calibration_days: 7.0,
             push: 0.5,
             push_s: 0.2,
+            upright_deg: 5.0,
             centre: centre::Params::default(),
             scales: scales::Params::default(),
             safety: warden::Params::default(),
@@ -73,6 +77,7 @@ impl Check for Params {
         c.range("calibration_days", self.calibration_days, 0.01..=3650.0);
         c.range("push", self.push, 0.0..=1.0);
         c.range("push_s", self.push_s, 0.0..=1.0);
+        c.range("upright_deg", self.upright_deg, 0.5..=45.0);
         self.centre.check(&mut c.section("centre"));
         self.scales.check(&mut c.section("scales"));
         self.safety.check(&mut c.section("safety"));

@@ -17,7 +17,7 @@ use super::calibration::{self, Procedure, Sight};
 use super::centre::{Centre, Pole, Unrest};
 use super::driver::{Driver, NotArmed, Stage, Stopped};
 use super::shelf::{Calibration, Uncalibrated, current};
-use crate::backend::safety::warden::{Standing, Wanted};
+use crate::backend::safety::warden::{Fault, Standing, Wanted};
 use crate::backend::wire::Counts;
 use crate::plant::cart_pole;
 use crate::signal::{Seconds, State};
@@ -241,6 +241,16 @@ impl Station {
                 }
             }
         }
+    }
+
+    /// Whoever asked for something is told why not.
+    pub const fn refuse(&mut self, why: NotArmed) {
+        self.refused = Some(why);
+    }
+
+    /// Nobody would stop the motor any more if this program died.
+    pub fn unguarded(&mut self, now: Seconds) {
+        self.driver.latch(Fault::Unguarded, now);
     }
 
     /// Whether a state waits for its command, and the command for the caller's wish: there is

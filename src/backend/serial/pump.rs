@@ -1,0 +1,369 @@
+//! The port's thread: moves bytes between a port and its station, keeps the motor's guard alive,
+//! and finds the device again when it was unplugged.
+
+use std::os::fd::AsFd;
+use std::path::PathBuf;
+use std::thread::JoinHandle;
+
+use hdrhistogram::Histogram;
+
+use super::Params;
+use super::address::Address;
+use super::desk::{Ask, Desk, Latency, Ring, View};
+use super::driver::{NotArmed, Stage, Stopped};
+use super::port::{Bell, Port};
+use super::shelf;
+use super::station::{About, Station, Wish};
+use crate::backend::guard::{self, Guard, Watch, last_resort};
+use crate::backend::safety::warden::Standing;
+use crate::clock::{Clock, WallClock};
+use crate::host::Host;
+use crate::signal::Seconds;
+
+/// Nobody waits longer than this for bytes: what is due in time is done in time.
+const TURN: Seconds = Seconds(0.01);
+/// A device that is not there is looked for this often.
+const SEARCH: Seconds = Seconds(0.25);
+/// How long a stop may take to be confirmed at the end.
+const FAREWELL: Seconds = Seconds(0.4);
+
+/// Where a station's device and its calibration are found.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// The device.
+    pub address: Address,
+    /// The folder of calibrations.
+    pub shelf: PathBuf,
+}
+
+/// A station at its port, with the thread that serves it.
+#[derive(Debug)]
+pub struct Pump {
+    desk: Desk,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Pump {
+    /// Starts to serve the plant of `params` at `place`. The device is greeted as soon as it is
+    /// there; `about` tells of the plant, but for what `place` tells.
+    ///
+    /// # Errors
+    /// When the calibration that is kept for the device cannot be read, or no thread starts.
+    pub fn start(
+        params: &Params,
+        place: Place,
+        about: About,
+        clock: WallClock,
+    ) -> Result<Self, StartError> {
+        let host = Host::here();
+        let device = match place.address.path(&host) {
+            Ok(path) => place.address.identity(&host, &path),
+            Err(_) => place.address.to_string(),
+        };
+        let found = shelf::load(&place.shelf, &device)?;
+        let about = About { device, found, ..about };
+        let period = about.period;
+        let station = Station::new(params, about);
+        let desk = Desk::new(station.look(clock.now()));
+        let mut server = Server {
+            stop: guard::stop_burst(params.format),
+            baud: params.baud.0,
+            // Its own judgement of silence comes first.
+            patience: Seconds(guard::PATIENCE.0.max(1.2 * params.safety.stale_periods * period.0)),
+            period,
+            place,
+            host,
+            clock,
+            desk: desk.clone(),
+            station,
+            link: None,
+            next_search: Seconds(0.0),
+            seen_at: Seconds(0.0),
+            latency_us: Histogram::new_with_max(10_000_000, 3).ok(),
+            not_kept: None,
+            is_over: false,
+        };
+        let thread = std::thread::Builder::new()
+            .name("coadapt-serial".to_owned())
+            .spawn(move || server.serve())
+            .map_err(StartError::Thread)?;
+        Ok(Self { desk, thread: Some(thread) })
+    }
+
+    /// Where the station is looked at and wished from.
+    #[must_use]
+    pub fn desk(&self) -> &Desk {
+        &self.desk
+    }
+
+    /// Stops the motor, closes the port, and tells whether the motor is known to be off.
+    pub fn close(mut self) -> Stopped {
+        self.end();
+        self.desk.see(|view| view.look.stopped)
+    }
+
+    fn end(&mut self) {
+        self.desk.ask(Ask::Close);
+        if let Some(thread) = self.thread.take() {
+            // One that failed has pulled the last resort.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Pump {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// Why a station is not served.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// Its calibration is there and cannot be read.
+    #[error(transparent)]
+    Shelf(#[from] shelf::Error),
+    /// The system gives no thread.
+    #[error("no thread for the serial port: {0}")]
+    Thread(std::io::Error),
+}
+
+/// An open port, and who guards it.
+struct Link {
+    port: Port,
+    guard: Option<Guard>,
+}
+
+impl Link {
+    /// Tells the guard that all is well, or what to mind.
+    fn beat(&mut self, watch: Watch) {
+        if let Some(guard) = &mut self.guard {
+            guard.beat(watch);
+        }
+        last_resort::set_mute(watch == Watch::Mute);
+    }
+
+    fn is_guarded(&mut self) -> bool {
+        self.guard.as_mut().is_some_and(Guard::is_watching)
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        // Whoever closes a port in order has stopped its motor before.
+        self.beat(Watch::Idle);
+        last_resort::disarm();
+    }
+}
+
+impl Ring for Bell {
+    fn ring(&self) {
+        Self::ring(self);
+    }
+}
+
+/// The thread's own.
+struct Server {
+    place: Place,
+    host: Host,
+    baud: u32,
+    stop: Vec<u8>,
+    patience: Seconds,
+    period: Seconds,
+    clock: WallClock,
+    desk: Desk,
+    station: Station,
+    link: Option<Link>,
+    next_search: Seconds,
+    /// When the state came that is answered next.
+    seen_at: Seconds,
+    latency_us: Option<Histogram<u64>>,
+    not_kept: Option<String>,
+    is_over: bool,
+}
+
+impl Server {
+    fn serve(&mut self) {
+        while !self.is_over {
+            self.turn();
+            self.show();
+        }
+        self.say_farewell();
+    }
+
+    /// One turn: bytes in, decisions, bytes out.
+    fn turn(&mut self) {
+        self.obey();
+        if self.link.is_none() {
+            self.search();
+        }
+        let mut buffer = [0; 4096];
+        let Some(link) = &mut self.link else {
+            self.clock.wait_until(self.clock.now() + TURN);
+            return;
+        };
+        let patience = if self.station.waits_for_caller() {
+            // The caller has half a period for its decision.
+            let left = self.seen_at + self.period * 0.5 - self.clock.now();
+            if left.0 > 0.0 { left } else { Seconds(0.0) }
+        } else {
+            TURN
+        };
+        match link.port.read(&mut buffer, patience) {
+            Ok(read) => {
+                let states = self.station.driver().states();
+                let now = self.clock.now();
+                self.station.read(&buffer[..read], now);
+                if self.station.driver().states() != states {
+                    self.seen_at = now;
+                }
+            }
+            Err(lost) => return self.lose(&lost.to_string()),
+        }
+        // What was asked meanwhile may be the caller's decision.
+        self.obey();
+        let is_late = self.clock.now() - self.seen_at >= self.period * 0.5;
+        let mut answers = self.station.driver().owes_command();
+        answers &= !self.station.waits_for_caller() || is_late;
+        if answers {
+            self.station.answer(self.clock.now());
+        }
+        self.heed_last_resort();
+        self.flush();
+        if answers {
+            self.note_latency();
+        }
+        self.heed_last_resort();
+        self.beat();
+        self.keep_calibration();
+    }
+
+    /// Does what was asked.
+    fn obey(&mut self) {
+        let now = self.clock.now();
+        for ask in self.desk.take_asked() {
+            match ask {
+                Ask::Wish(Wish::Arm) if !self.is_guarded() => {
+                    self.station.refuse(NotArmed::Unguarded);
+                }
+                Ask::Wish(wish) => self.station.obey(wish, now),
+                Ask::Want(action, at) => self.station.want(action, at),
+                Ask::Enable(is_held, at) => self.station.enable(is_held, at),
+                Ask::Close => self.is_over = true,
+            }
+        }
+    }
+
+    fn is_guarded(&mut self) -> bool {
+        self.link.as_mut().is_some_and(Link::is_guarded)
+    }
+
+    /// Looks for the device, and opens its port.
+    fn search(&mut self) {
+        let now = self.clock.now();
+        if now < self.next_search {
+            return;
+        }
+        self.next_search = now + SEARCH;
+        let path = match self.place.address.path(&self.host) {
+            Ok(path) => path,
+            Err(missing) => return self.station.lost(missing.to_string()),
+        };
+        match Port::open(&path, self.baud) {
+            Ok((port, bell)) => {
+                let guard = Guard::start(&port, &self.stop, self.patience).ok();
+                if let Ok(copy) = port.as_fd().try_clone_to_owned() {
+                    last_resort::arm(copy, &self.stop);
+                }
+                self.desk.hang(Some(Box::new(bell)));
+                self.link = Some(Link { port, guard });
+                self.station.opened(self.clock.now());
+            }
+            Err(error) => self.station.lost(error.to_string()),
+        }
+    }
+
+    /// The device is gone: its port is closed at once, or it would come back under another name.
+    fn lose(&mut self, why: &str) {
+        self.link = None;
+        self.desk.hang(None);
+        self.station.lost(why);
+        self.next_search = self.clock.now() + SEARCH;
+    }
+
+    fn flush(&mut self) {
+        let output = self.station.take_output();
+        let Some(link) = &self.link else { return };
+        if let Err(lost) = link.port.write(&output) {
+            self.lose(&lost.to_string());
+        }
+    }
+
+    /// Somebody has stopped the motor past this thread: it must not drive on.
+    fn heed_last_resort(&mut self) {
+        if last_resort::was_pulled() && self.station.driver().standing() == Standing::Armed {
+            self.station.obey(Wish::Stop, self.clock.now());
+            self.flush();
+        }
+    }
+
+    fn beat(&mut self) {
+        let driver = self.station.driver();
+        let watch = match (driver.stage(), driver.standing()) {
+            (Stage::Homing, _) => Watch::Mute,
+            (_, Standing::Armed) => Watch::Armed,
+            _ => Watch::Idle,
+        };
+        let Some(link) = &mut self.link else { return };
+        link.beat(watch);
+        if watch == Watch::Armed && !link.is_guarded() {
+            self.station.unguarded(self.clock.now());
+        }
+    }
+
+    fn note_latency(&mut self) {
+        let passed = (self.clock.now() - self.seen_at).0 * 1e6;
+        if let Some(histogram) = &mut self.latency_us {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "saturates"
+            )]
+            histogram.saturating_record(passed as u64);
+        }
+    }
+
+    fn keep_calibration(&mut self) {
+        if let Some(calibration) = self.station.take_calibration() {
+            let stored = shelf::store(&self.place.shelf, &calibration);
+            self.not_kept = stored.err().map(|error| error.to_string());
+        }
+    }
+
+    fn show(&mut self) {
+        let latency = self.latency_us.as_ref().map_or_else(Latency::default, |all| Latency {
+            p50_us: all.value_at_quantile(0.5),
+            p99_us: all.value_at_quantile(0.99),
+            max_us: all.max(),
+        });
+        let look = self.station.look(self.clock.now());
+        self.desk.show(View { look, latency, not_kept: self.not_kept.clone() });
+    }
+
+    /// The motor stops, and is given time to say so.
+    fn say_farewell(&mut self) {
+        let end = self.clock.now() + FAREWELL;
+        if self.link.is_some() && *self.station.driver().stage() == Stage::Ready {
+            self.station.obey(Wish::Disarm, self.clock.now());
+            while self.clock.now() < end
+                && self.link.is_some()
+                && self.station.driver().stopped() == Stopped::Told
+            {
+                self.turn();
+            }
+        }
+        self.link = None;
+        self.desk.hang(None);
+        self.show();
+    }
+}

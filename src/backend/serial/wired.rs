@@ -1,0 +1,236 @@
+//! A real plant as the control cycle sees it, and the clock that it keeps.
+
+use std::f64::consts::PI;
+
+use super::centre::Pole;
+use super::desk::{Ask, Desk};
+use super::driver::Stage;
+use super::station::{Duty, Look, Wish};
+use crate::backend::safety::warden::Standing;
+use crate::backend::{Backend, Readiness, Sensed};
+use crate::clock::{Clock, WallClock};
+use crate::random::Place;
+use crate::signal::{Action, Seconds, State, wrapped};
+
+/// How a rollout begins on a real plant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Manner {
+    /// The largest action, in the plant's unit.
+    pub limit: f64,
+    /// The time between two states.
+    pub period: Seconds,
+    /// A test begins with this part of the largest action,
+    pub push: f64,
+    /// for so long.
+    pub push_time: Seconds,
+    /// A pole that is to stand upright does so within this angle, rad.
+    pub upright: f64,
+    /// The switch that enables the motor, in words: `hold L1`. `None`: nobody needs to.
+    pub switch: Option<String>,
+}
+
+/// A rollout begins with this push.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Push {
+    action: f64,
+    /// It lasts until then, once it has begun.
+    until: Option<Seconds>,
+}
+
+/// A real plant.
+#[derive(Debug)]
+pub struct Wired {
+    desk: Desk,
+    clock: WallClock,
+    manner: Manner,
+    /// The rollout that was prepared has not begun: where its pole must be.
+    start: Option<Pole>,
+    push: Option<Push>,
+    /// The operator's device has a switch that enables the motor.
+    has_switch: bool,
+}
+
+impl Wired {
+    /// The plant whose station is at `desk`; `clock` is the one that its port goes by.
+    #[must_use]
+    pub fn new(desk: Desk, clock: WallClock, manner: Manner) -> Self {
+        Self { desk, clock, manner, start: None, push: None, has_switch: true }
+    }
+
+    /// The push that the rollout begins with, while it lasts.
+    fn pushed(&mut self, now: Seconds) -> Option<f64> {
+        let push = self.push.as_mut()?;
+        let until = *push.until.get_or_insert(now + self.manner.push_time);
+        let action = push.action;
+        if now >= until {
+            self.push = None;
+            return None;
+        }
+        Some(action)
+    }
+}
+
+impl Backend for Wired {
+    fn sense(&mut self) -> Sensed {
+        let now = self.clock.now();
+        match self.desk.see(|view| view.look.latest) {
+            Some((state, at)) => Sensed { state, age: now - at },
+            None => Sensed { state: State::new([0.0; 4]), age: Seconds(f64::INFINITY) },
+        }
+    }
+
+    fn actuate(&mut self, wanted: Action) -> Action {
+        let now = self.clock.now();
+        self.start = None;
+        let action = self.pushed(now).unwrap_or(wanted.0);
+        let state = self.desk.see(|view| view.look.states);
+        self.desk.ask(Ask::Want(action, now));
+        // What the plant really gets is known once its port's thread has written it.
+        let patience = self.manner.period * 0.5;
+        let applied = self
+            .desk
+            .wait(patience, |view| (view.look.answered >= state).then_some(view.look.applied));
+        Action(applied.unwrap_or_else(|| self.desk.see(|view| view.look.applied)))
+    }
+
+    fn halt(&mut self) {
+        self.push = None;
+        self.desk.wish(Wish::Rest);
+    }
+
+    fn prepare(&mut self, start: State, _place: Place) {
+        let value = |index: usize| start.get(index).copied().unwrap_or(0.0);
+        let (theta, turning) = (value(2), value(3));
+        let hangs = wrapped(theta - PI).abs() < PI / 2.0;
+        let pole = if hangs { Pole::Hanging } else { Pole::Anywhere };
+        self.start = Some(pole);
+        // A plant cannot be put into motion: what turns is pushed to that side.
+        self.push = (hangs && turning != 0.0).then(|| Push {
+            action: turning.signum() * self.manner.push * self.manner.limit,
+            until: None,
+        });
+        self.desk.wish(Wish::Return(pole));
+    }
+
+    fn go_on(&mut self, _place: Place) {}
+
+    fn readiness(&mut self) -> Readiness {
+        let waits = |why: String, needs_person: bool| Readiness::Waits { why, needs_person };
+        let (start, switch) = (self.start, self.manner.switch.clone());
+        let look = self.desk.see(|view| view.look.clone());
+        if let Some(why) = off(&look) {
+            return waits(why, true);
+        }
+        if !look.is_enabled && !self.has_switch {
+            return waits(NO_SWITCH.to_owned(), true);
+        }
+        if !look.is_enabled {
+            let switch = switch.unwrap_or_else(|| "hold the switch".to_owned());
+            return waits(format!("{switch} to enable the motor"), true);
+        }
+        match look.duty {
+            _ if start.is_none() => Readiness::Ready,
+            Duty::Return { is_there: true, .. } => Readiness::Ready,
+            Duty::Return { trouble: Some(trouble), .. } => waits(trouble.to_string(), true),
+            Duty::Return { .. } => {
+                waits("the cart returns to the middle, the pole comes to rest".to_owned(), false)
+            }
+            // It was interrupted: once more.
+            _ => {
+                self.desk.wish(Wish::Return(start.unwrap_or_default()));
+                waits("the cart is about to return".to_owned(), false)
+            }
+        }
+    }
+
+    fn is_at_start(&mut self) -> bool {
+        match self.start {
+            Some(Pole::Anywhere) => {
+                let theta = self.sense().state.get(2).copied().unwrap_or(PI);
+                wrapped(theta).abs() <= self.manner.upright
+            }
+            _ => true,
+        }
+    }
+
+    fn enable(&mut self, is_held: Option<bool>) {
+        self.has_switch = is_held.is_some();
+        self.desk.ask(Ask::Enable(is_held == Some(true), self.clock.now()));
+    }
+
+    fn stop(&mut self) {
+        self.push = None;
+        self.desk.wish(Wish::Stop);
+    }
+
+    fn fault(&mut self) -> Option<String> {
+        match self.desk.see(|view| view.look.standing) {
+            Standing::Latched(fault) => Some(fault.to_string()),
+            _ => None,
+        }
+    }
+
+    fn is_real(&self) -> bool {
+        true
+    }
+}
+
+/// What is said where nobody can hold a switch.
+const NO_SWITCH: &str = "this terminal reports no key releases, so that no key can be held to \
+    enable the motor: use a gamepad, the mouse, or a terminal such as kitty or foot";
+
+/// Why the motor is off, and what a person can do about it; `None` for one that follows.
+fn off(look: &Look) -> Option<String> {
+    Some(match (&look.stage, look.standing) {
+        (Stage::Closed(why), _) => why.clone(),
+        (Stage::Opening, _) => "the device is being greeted".to_owned(),
+        (Stage::Homing, _) => "the device looks for its ends".to_owned(),
+        (Stage::Ready, Standing::Latched(fault)) => format!("stopped: {fault}"),
+        (Stage::Ready, Standing::Disarmed) => "the motor is not armed".to_owned(),
+        (Stage::Ready, Standing::Armed) => return None,
+    })
+}
+
+/// The clock of a real plant: its states are the ticks.
+#[derive(Clone, Debug)]
+pub struct Metronome {
+    desk: Desk,
+    clock: WallClock,
+    period: Seconds,
+    /// States that ticks were made of, or that came too late for one.
+    seen: u64,
+}
+
+impl Metronome {
+    /// The clock of the plant at `desk`, which sends a state each `period`.
+    #[must_use]
+    pub const fn new(desk: Desk, clock: WallClock, period: Seconds) -> Self {
+        Self { desk, clock, period, seen: 0 }
+    }
+}
+
+impl Clock for Metronome {
+    fn now(&self) -> Seconds {
+        self.clock.now()
+    }
+
+    /// Returns when the next state has come, or half a period after `deadline` without one.
+    fn wait_until(&mut self, deadline: Seconds) -> Seconds {
+        let seen = self.seen;
+        let left = deadline + self.period * 0.5 - self.clock.now();
+        let came = self.desk.wait(left, |view| {
+            let (_, at) = view.look.latest.filter(|_| view.look.states > seen)?;
+            Some((view.look.states, at))
+        });
+        let Some((states, at)) = came else { return deadline };
+        self.seen = states;
+        // Of several the first was the one to wait for: the others are missed ticks.
+        #[expect(clippy::cast_precision_loss, reason = "a few states")]
+        let skipped = if seen == 0 { 0.0 } else { (states - seen - 1).min(50) as f64 };
+        at - self.period * skipped
+    }
+
+    fn is_wall(&self) -> bool {
+        true
+    }
+}

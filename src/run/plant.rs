@@ -1,0 +1,255 @@
+//! The real plant of a session: chosen, opened, and stopped at the end.
+
+use std::path::Path;
+
+use super::RunError;
+use super::panics::tell_later;
+use super::session::{Company, usage};
+use crate::backend::safety::warden::Standing;
+use crate::backend::safety::{Limits, Safe};
+use crate::backend::serial::address::Address;
+use crate::backend::serial::desk::{Desk, View};
+use crate::backend::serial::driver::{Stage, Stopped};
+use crate::backend::serial::pump::{Place, Pump};
+use crate::backend::serial::station::{About, Wish};
+use crate::backend::serial::wired::{Manner, Metronome, Wired};
+use crate::backend::serial::{self};
+use crate::backend::wire::Format;
+use crate::clock::{self, WallClock};
+use crate::operator::Choice;
+use crate::profile::Profile;
+use crate::session::plan::Plan;
+use crate::signal::Seconds;
+
+/// The folder of calibrations, among the sessions: no subject's name begins with a dot.
+const SHELF: &str = ".calibrations";
+/// How long a device that nobody watches may take to be there,
+const APPEARS: Seconds = Seconds(10.0);
+/// to find its ends,
+const HOMES: Seconds = Seconds(45.0);
+/// and to follow.
+const ARMS: Seconds = Seconds(3.0);
+
+/// A real plant at its port.
+pub(super) struct Real {
+    pump: Pump,
+    clock: WallClock,
+    manner: Manner,
+    params: serial::Params,
+    port: String,
+}
+
+/// The device that `backend` names; none for the simulated plant.
+///
+/// # Errors
+/// When there is no such backend, or this session may not have it.
+pub(super) fn chosen(
+    backend: &str,
+    profile: &Profile,
+    choice: &Choice,
+    company: &Company,
+) -> Result<Option<Address>, RunError> {
+    let refused = |why: &str| Err(RunError::Usage(format!("--backend {backend}: {why}")));
+    if backend == "simulated" {
+        return match company {
+            Company::Armed => Err(RunError::Usage(
+                "--arm is for a real plant: add --backend serial:PORT, or leave it out".to_owned(),
+            )),
+            _ => Ok(None),
+        };
+    }
+    let Some(words) = backend.strip_prefix("serial:") else {
+        return refused("is not known; give simulated, or serial:PORT for a real plant");
+    };
+    let address = words.parse::<Address>().map_err(|error| usage(&error))?;
+    let Some(plant) = &profile.backend else {
+        return refused(
+            "this profile has no section `backend` and so no real plant; physical-cart-pole and \
+             cobs-cart-pole have one",
+        );
+    };
+    match company {
+        Company::Headless => refused(
+            "a real plant without a screen has to be armed by --arm; stay beside it, with a hand \
+             on its power switch",
+        ),
+        Company::Attended(_) if plant.hold_to_enable && choice.device().is_none() => refused(
+            "its motor moves only while a person holds a switch, and this operator has none: give \
+             --operator keyboard, gamepad or mouse",
+        ),
+        _ => Ok(Some(address)),
+    }
+}
+
+impl Real {
+    /// The plant of `profile` at `address`, whose port is opened as soon as it is there.
+    ///
+    /// # Errors
+    /// When its calibration cannot be read. Without a screen also when it cannot be armed.
+    pub(super) fn open(
+        address: Address,
+        profile: &Profile,
+        choice: &Choice,
+        company: &Company,
+        logs: &Path,
+    ) -> Result<Self, RunError> {
+        let Some(mut params) = profile.backend.clone() else {
+            return Err(RunError::Failed("the profile has no real plant".to_owned()));
+        };
+        let Some(plant) = profile.experiment.cart_pole().cloned() else {
+            return Err(RunError::Failed("the profile's plant is no cart-pole".to_owned()));
+        };
+        let clock = match company {
+            Company::Attended(keys) => keys.clock,
+            Company::Headless | Company::Armed => WallClock::start(),
+        };
+        if matches!(company, Company::Armed) {
+            // Who gave --arm stands beside it.
+            params.hold_to_enable = false;
+        }
+        let switch = choice
+            .device()
+            .filter(|_| params.hold_to_enable)
+            .and_then(|device| profile.operator.switch_name(device));
+        let (tick, limit) = (profile.tick(), plant.force_limit_n);
+        let manner = Manner {
+            limit,
+            period: tick,
+            push: params.push,
+            push_time: Seconds(params.push_s),
+            upright: params.upright_deg.to_radians(),
+            switch,
+        };
+        let about = About {
+            device: String::new(),
+            period: tick,
+            limit,
+            plant,
+            found: None,
+            now: clock::today(),
+        };
+        let port = address.to_string();
+        let place = Place { address, shelf: logs.join(SHELF) };
+        let pump = Pump::start(&params, place, about, clock)
+            .map_err(|error| RunError::Failed(error.to_string()))?;
+        let real = Self { pump, clock, manner, params, port };
+        if matches!(company, Company::Armed) {
+            real.arm()?;
+        }
+        Ok(real)
+    }
+
+    /// Homes and arms a plant that nobody watches at a screen.
+    fn arm(&self) -> Result<(), RunError> {
+        let desk = self.pump.desk();
+        let failed = |why: String| RunError::Failed(format!("{}: {why}", self.port));
+        let is_ready = |view: &View| (view.look.stage == Stage::Ready).then_some(());
+        let waits = |patience, what: &str| {
+            desk.wait(patience, is_ready).ok_or_else(|| {
+                failed(match desk.see(|view| view.look.stage.clone()) {
+                    Stage::Closed(why) => why,
+                    _ => what.to_owned(),
+                })
+            })
+        };
+        waits(APPEARS, "the device does not become ready")?;
+        desk.see(|view| view.look.calibrated.clone()).map_err(|why| {
+            failed(format!("{why}; run this profile once without --headless, and press d, c"))
+        })?;
+        if !desk.see(|view| view.look.is_homed) {
+            desk.wish(Wish::Home);
+            desk.wait(HOMES, |view| view.look.is_homed.then_some(()))
+                .ok_or_else(|| failed("homing found no ends".to_owned()))?;
+            waits(APPEARS, "the device is not ready after homing")?;
+        }
+        // The guard's process may still be starting, and the motor's stop unconfirmed.
+        let end = self.clock_now() + ARMS;
+        while self.clock_now() < end {
+            desk.wish(Wish::Arm);
+            let is_armed = |view: &View| (view.look.standing == Standing::Armed).then_some(());
+            if desk.wait(Seconds(0.2), is_armed).is_some() {
+                return Ok(());
+            }
+        }
+        let why = desk.see(|view| view.look.refused.map(|refused| refused.to_string()));
+        Err(failed(why.unwrap_or_else(|| "the motor could not be armed".to_owned())))
+    }
+
+    fn clock_now(&self) -> Seconds {
+        use crate::clock::Clock;
+        self.clock.now()
+    }
+
+    /// The plant for the control cycle, within its limits.
+    pub(super) fn backend(&self) -> Safe {
+        let Manner { limit, period, .. } = self.manner;
+        // The plant's own guard, which knows more, is to be heard first.
+        let stale = period * (2.0 * self.params.safety.stale_periods);
+        let wired = Wired::new(self.pump.desk().clone(), self.clock, self.manner.clone());
+        Safe::new(Box::new(wired), Limits { action: limit, stale })
+    }
+
+    /// The clock of its states.
+    pub(super) fn metronome(&self) -> Metronome {
+        Metronome::new(self.pump.desk().clone(), self.clock, self.manner.period)
+    }
+
+    /// Where it is looked at and wished from.
+    pub(super) fn desk(&self) -> &Desk {
+        self.pump.desk()
+    }
+
+    /// Its port as the command line has it.
+    pub(super) fn port(&self) -> &str {
+        &self.port
+    }
+
+    /// What the profile says of it.
+    pub(super) const fn params(&self) -> &serial::Params {
+        &self.params
+    }
+
+    /// The switch that enables its motor.
+    pub(super) fn switch(&self) -> Option<&str> {
+        self.manner.switch.as_deref()
+    }
+
+    /// What `session.json` calls it.
+    pub(super) fn name(&self) -> String {
+        let look = self.pump.desk().view().look;
+        let calibrated =
+            look.calibrated.map_or_else(|why| why.to_string(), |at| format!("calibrated {at}"));
+        format!("{}, {calibrated}", look.device)
+    }
+
+    /// Stops the motor and closes the port. A stop that is not confirmed is said aloud.
+    pub(super) fn close(self) {
+        let format = self.params.format;
+        match self.pump.close() {
+            Stopped::Confirmed | Stopped::No => {}
+            Stopped::Told | Stopped::Unconfirmed => tell_later(&format!(
+                "THE STOP WAS NOT CONFIRMED by the device: {}",
+                out_of_reach(format)
+            )),
+        }
+    }
+}
+
+/// What to do about a motor that nobody can reach.
+const fn out_of_reach(format: Format) -> &'static str {
+    match format {
+        Format::Sensorsini31 => {
+            "this board keeps its last command for ever; if the cart moves, switch the motor's \
+             supply off"
+        }
+        Format::Cobs1 => {
+            "its own watchdog stops the motor; if the cart still moves, switch the supply off"
+        }
+    }
+}
+
+/// A rollout on a real plant waits until that is ready: a countdown of a tick at least.
+pub(super) fn waits_for_the_plant(plan: &mut Plan) {
+    plan.hold_ticks = plan.hold_ticks.max(1);
+    plan.autonomous_hold_ticks = plan.autonomous_hold_ticks.max(1);
+}
