@@ -196,3 +196,23 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn drag_is_a_force_that_the_pole_feels() {
+    let start = State::new([0.0, 0.4, 2.0, 1.0]);
+    let dragged = Params { cart_drag_n_s_per_m: 3.22, ..frictionless() };
+    assert_eq!(
+        CartPole::new(dragged.clone(), TICK).step(&start, Action(1.77)),
+        CartPole::new(frictionless(), TICK).step(&start, Action(1.77 - 3.22 * 0.4)),
+    );
+    // At the speed where the drag takes all of the force nothing accelerates, and the pole hangs
+    // straight. Friction of eq. 15 would let it lean.
+    let mut plant =
+        CartPole::new(Params { pole_friction_per_s: 2.0, substeps: 10, ..dragged }, TICK);
+    let mut state = State::new([0.0, 0.0, std::f64::consts::PI, 0.0]);
+    for _ in 0..1500 {
+        state = plant.step(&state, Action(1.77));
+    }
+    assert!((state[1] - 1.77 / 3.22).abs() < 1e-6, "{state:?}");
+    assert!((state[2] - std::f64::consts::PI).abs() < 1e-6, "{state:?}");
+}

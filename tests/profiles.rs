@@ -4,6 +4,8 @@
 
 use std::path::{Path, PathBuf};
 
+use coadapt::backend::serial::scales;
+use coadapt::plant::cart_pole;
 use coadapt::profile::{
     Document, Experiment, Origin, Profile, ProfileError, WantedMode, list, show,
 };
@@ -100,32 +102,67 @@ fn a_task_has_its_own_defaults_for_what_a_profile_leaves_out() {
 #[test]
 fn the_plain_profiles_hold_every_key_with_meaning_default_and_range() {
     for task in Experiment::NAMES {
-        holds_every_key(task);
+        let keys = key_lines(&plain(task));
+        let usual = key_lines(&read(&plain(task)).to_ron());
+        assert!(usual.len() > 40);
+        hold_every_key(task, &keys, &usual);
     }
 }
 
-fn holds_every_key(task: &str) {
-    let keys = key_lines(&plain(task));
-    let shown = key_lines(&read(&plain(task)).to_ron());
-    assert!(shown.len() > 40);
-    for (key, _, _) in &shown {
-        assert!(keys.iter().any(|(known, _, _)| known == key), "{key} is missing");
+/// The profiles of real plants.
+const HARDWARE: [&str; 4] =
+    ["cobs-cart-pole", "physical-balance", "physical-cart-pole", "physical-cart-pole-short"];
+
+/// The keys below `backend` of a profile's lines.
+fn of_backend(text: &str) -> Vec<(String, String, String)> {
+    let mut keys = key_lines(text);
+    keys.retain(|(key, _, _)| key.starts_with("backend."));
+    keys
+}
+
+#[test]
+fn the_hardware_profiles_hold_every_key_of_the_real_plant() {
+    let usual = of_backend(&read("(task: \"swing-up\", backend: ())").to_ron());
+    assert!(usual.len() > 40);
+    for name in HARDWARE {
+        hold_every_key(name, &of_backend(&plain(name)), &usual);
     }
-    for (key, value, comment) in keys {
-        assert!(comment.contains("default"), "{key}: {comment:?}");
-        if value.len() < 60 {
-            assert!(comment.contains(&format!("default {value}")), "{key}: {comment:?}");
-        }
+}
+
+/// Whether `comment` names this default: a number in any spelling, and an option as in text.
+fn tells_default(comment: &str, default: &str) -> bool {
+    let number = |word: &str| word.parse::<f64>().ok();
+    let told = comment.split_once("default ").and_then(|(_, told)| told.split(';').next());
+    comment.contains(&format!("default {default}"))
+        || comment.contains(&format!("default Some({default})"))
+        || told.and_then(number).is_some_and(|told| Some(told) == number(default))
+}
+
+/// Checks that `keys`, a part of the profile `name`, are all of the `usual` ones, each with the
+/// usual value as its default and the range that is checked.
+fn hold_every_key(
+    name: &str,
+    keys: &[(String, String, String)],
+    usual: &[(String, String, String)],
+) {
+    for (key, default, _) in usual {
+        let known = keys.iter().find(|(known, _, _)| known == key);
+        let (_, _, comment) = known.unwrap_or_else(|| panic!("{name}: {key} is missing"));
+        assert!(comment.contains("default"), "{name}: {key}: {comment:?}");
+        let told = default.len() >= 60 || tells_default(comment, default);
+        assert!(told, "{name}: {key}: {comment:?} but {default}");
+    }
+    for (key, _, comment) in keys {
         // The range in the comment is the one that is checked.
-        for beyond in ["1e300", "4294967295"] {
-            let mut document = Document::find(task, &nowhere()).unwrap();
-            document.set(&key, beyond);
+        for beyond in ["1e300", "4294967295", "2000000000", "65535"] {
+            let mut document = Document::find(name, &nowhere()).unwrap();
+            document.set(key, beyond);
             let Err(report) = document.read() else { continue };
             for fault in report.faults() {
                 let allowed = fault.expected.strip_prefix("allowed: ");
                 let range = allowed.filter(|words| words.starts_with(|c: char| c.is_ascii_digit()));
                 if let Some(range) = range {
-                    assert!(comment.contains(range), "{key}: {comment:?} but {range}");
+                    assert!(comment.contains(range), "{name}: {key}: {comment:?} but {range}");
                 }
             }
         }
@@ -137,18 +174,76 @@ fn holds_every_key(task: &str) {
 fn the_modern_profiles_say_what_differs_from_the_plain_ones() {
     for task in Experiment::NAMES {
         let text = plain(&format!("{task}-modern"));
-        let (modern, usual) = (read(&text), read(&plain(task)));
-        assert_eq!((modern.preset.as_str(), usual.preset.as_str()), ("modern", "thesis"));
-        let usual = key_lines(&usual.to_ron());
-        let keys = key_lines(&text);
+        assert_eq!(read(&text).preset, "modern");
         assert!(text.contains("Never pool sessions"), "{task}");
-        assert!(keys.len() > 3, "{task}");
-        for (key, value, comment) in keys.iter().filter(|(key, _, _)| key != "task") {
-            let (_, default, _) = usual.iter().find(|(known, _, _)| known == key).unwrap();
-            assert_ne!(value, default, "{task}: {key}");
-            let told = comment.contains(&format!("default {default}"));
-            assert!(told, "{task}: {key}: {comment:?} but {default}");
-        }
+        says_what_differs(&text);
+    }
+}
+
+/// So does one of a real plant, but for the section `backend`.
+#[test]
+fn the_hardware_profiles_say_what_differs_from_the_plain_ones() {
+    for name in HARDWARE {
+        says_what_differs(&plain(name));
+    }
+}
+
+fn says_what_differs(text: &str) {
+    let profile = read(text);
+    let task = profile.experiment.name();
+    let usual = read(&plain(task));
+    assert_eq!(usual.preset, "thesis");
+    let usual = key_lines(&usual.to_ron());
+    let mut keys = key_lines(text);
+    keys.retain(|(key, _, _)| key != "task" && !key.starts_with("backend."));
+    assert!(keys.len() > 2, "{task}");
+    for (key, value, comment) in &keys {
+        let (_, default, _) = usual.iter().find(|(known, _, _)| known == key).unwrap();
+        assert_ne!(value, default, "{task}: {key}");
+        let told = comment.contains(&format!("default {default}"));
+        assert!(told, "{task}: {key}: {comment:?} but {default}");
+    }
+}
+
+/// A real cart-pole and the model of it that stands in for its board are the same robot.
+#[test]
+fn the_hardware_profiles_plant_is_their_emulated_one() {
+    for name in HARDWARE {
+        let profile = read(&plain(name));
+        let (Experiment::SwingUp { plant, .. } | Experiment::Balance { plant, .. }) =
+            profile.experiment
+        else {
+            panic!("{name} is no cart-pole")
+        };
+        let real = profile.backend.unwrap();
+        let rig = &real.emulated;
+        // The board's model has the drag and the largest force at its motor.
+        let board = cart_pole::Params {
+            cart_drag_n_s_per_m: rig.motor.viscous_n_s_per_m,
+            force_limit_n: rig.motor.force_n,
+            substeps: plant.substeps,
+            ..rig.plant.clone()
+        };
+        assert_eq!(board, plant, "{name}");
+        // What is read and sent is scaled as the board's model does it.
+        let scales = scales::Params {
+            angle: scales::Angle {
+                counts_per_turn: rig.angle.counts_per_turn,
+                hanging: rig.angle.hanging,
+                invert: rig.angle.sign < 0,
+                upright_deg: 0.0,
+            },
+            position: scales::Position { m_per_count: rig.m_per_count, invert: false },
+            motor: scales::Motor {
+                full_scale: rig.motor.full_scale.unsigned_abs(),
+                gain: rig.motor.gain,
+                friction_forward: rig.motor.friction_forward,
+                friction_backward: rig.motor.friction_backward,
+                ..scales::Motor::default()
+            },
+            ..scales::Params::default()
+        };
+        assert_eq!(scales, real.scales, "{name}");
     }
 }
 
@@ -255,7 +350,8 @@ fn names_and_paths_are_found_or_the_message_helps() {
     let error = |name: &str| find(name).unwrap_err().to_string();
     assert!(error("balanse").contains("did you mean `balance`?"));
     assert!(
-        error("zzz").contains("the known ones are balance, balance-modern, binary, huge, mine")
+        error("zzz")
+            .contains("the known ones are balance, balance-modern, binary, cobs-cart-pole, huge")
     );
     assert!(error("").contains("the known ones"));
     assert!(error("./none.ron").contains("./none.ron cannot be read: No such file"));

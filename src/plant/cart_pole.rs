@@ -41,8 +41,11 @@ pub struct Params {
     pub gravity_m_s2: f64,
     /// `σ_θ` of eq. 14, 1/s.
     pub pole_friction_per_s: f64,
-    /// `σ_x` of eq. 15, 1/s.
+    /// `σ_x` of eq. 15, 1/s: slows the cart, but not the pole.
     pub cart_friction_per_s: f64,
+    /// What a belt and a motor take from a moving cart, N·s/m: a force as any other, which the
+    /// pole feels, too (ours).
+    pub cart_drag_n_s_per_m: f64,
     /// ρ of eq. 14–15 is drawn uniformly from ± this each control step, 1/s.
     pub friction_noise_per_s: f64,
     /// The track's length, m, centred on x = 0; `None` for an endless track.
@@ -66,6 +69,7 @@ impl Default for Params {
             gravity_m_s2: 9.8,
             pole_friction_per_s: 0.2,
             cart_friction_per_s: 0.5,
+            cart_drag_n_s_per_m: 0.0,
             friction_noise_per_s: 0.05,
             track_length_m: Some(1.0),
             bounce: 0.2,
@@ -85,6 +89,7 @@ impl Check for Params {
         c.range("gravity_m_s2", self.gravity_m_s2, 0.0..=30.0);
         c.range("pole_friction_per_s", self.pole_friction_per_s, 0.0..=20.0);
         c.range("cart_friction_per_s", self.cart_friction_per_s, 0.0..=20.0);
+        c.range("cart_drag_n_s_per_m", self.cart_drag_n_s_per_m, 0.0..=100.0);
         c.range("friction_noise_per_s", self.friction_noise_per_s, 0.0..=5.0);
         if let Some(length) = self.track_length_m {
             c.range("track_length_m", length, 0.1..=100.0);
@@ -144,7 +149,8 @@ impl Plant for CartPole {
         let cart_friction = self.params.cart_friction_per_s + self.rho();
         let h = self.dt / f64::from(self.params.substeps);
         for _ in 0..self.params.substeps {
-            let (x_acc, theta_acc) = self.accelerations(action.0, theta, theta_dot);
+            let force = action.0 - self.params.cart_drag_n_s_per_m * x_dot;
+            let (x_acc, theta_acc) = self.accelerations(force, theta, theta_dot);
             let x_acc = x_acc - cart_friction * x_dot;
             let theta_acc = theta_acc - pole_friction * theta_dot;
             match self.params.integrator {

@@ -140,6 +140,18 @@ macro_rules! sections {
                     self.tick_ms,
                     "a whole number of 2 to 50 with a real plant, whose states come each",
                 );
+                if let (Some(real), Some((_, end))) = (&self.backend, task.ends()) {
+                    let limit = real.safety.hard_limit_m;
+                    c.demand(
+                        limit < end,
+                        "backend.safety.hard_limit_m",
+                        limit,
+                        &format!(
+                            "less than {end}, half of the plant's track, or the cart runs into \
+                             its end before it is stopped"
+                        ),
+                    );
+                }
                 $(self.$section.check(&mut c.section(stringify!($section)));)*
             }
         }

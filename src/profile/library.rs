@@ -7,13 +7,15 @@ use std::path::{Path, PathBuf};
 use super::reading::nearest;
 
 /// The profiles built into the program.
-const BUILT_IN: [(&str, &str); 10] = [
+const BUILT_IN: [(&str, &str); 12] = [
     ("balance", include_str!("../../profiles/balance.ron")),
     ("balance-modern", include_str!("../../profiles/balance-modern.ron")),
     ("cobs-cart-pole", include_str!("../../profiles/cobs-cart-pole.ron")),
     ("mountain-car", include_str!("../../profiles/mountain-car.ron")),
     ("mountain-car-modern", include_str!("../../profiles/mountain-car-modern.ron")),
+    ("physical-balance", include_str!("../../profiles/physical-balance.ron")),
     ("physical-cart-pole", include_str!("../../profiles/physical-cart-pole.ron")),
+    ("physical-cart-pole-short", include_str!("../../profiles/physical-cart-pole-short.ron")),
     ("speed-up", include_str!("../../profiles/speed-up.ron")),
     ("speed-up-modern", include_str!("../../profiles/speed-up-modern.ron")),
     ("swing-up", include_str!("../../profiles/swing-up.ron")),

@@ -27,8 +27,10 @@ const SHELF: &str = ".calibrations";
 const APPEARS: Seconds = Seconds(10.0);
 /// to find its ends,
 const HOMES: Seconds = Seconds(45.0);
-/// and to follow.
-const ARMS: Seconds = Seconds(3.0);
+/// What is not done at once is wished so many times,
+const TRIES: u32 = 15;
+/// with so much time between.
+const BETWEEN: Seconds = Seconds(0.2);
 
 /// A real plant at its port.
 pub(super) struct Real {
@@ -157,27 +159,30 @@ impl Real {
             failed(format!("{why}; run this profile once without --headless, and press d, c"))
         })?;
         if !desk.see(|view| view.look.is_homed) {
-            desk.wish(Wish::Home);
+            let begins = |view: &View| {
+                (view.look.stage == Stage::Homing || view.look.is_homed).then_some(())
+            };
+            self.insist(Wish::Home, begins)?;
             desk.wait(HOMES, |view| view.look.is_homed.then_some(()))
                 .ok_or_else(|| failed("homing found no ends".to_owned()))?;
             waits(APPEARS, "the device is not ready after homing")?;
         }
-        // The guard's process may still be starting, and the motor's stop unconfirmed.
-        let end = self.clock_now() + ARMS;
-        while self.clock_now() < end {
-            desk.wish(Wish::Arm);
-            let is_armed = |view: &View| (view.look.standing == Standing::Armed).then_some(());
-            if desk.wait(Seconds(0.2), is_armed).is_some() {
+        self.insist(Wish::Arm, |view| (view.look.standing == Standing::Armed).then_some(()))
+    }
+
+    /// Wishes again and again until it comes true: at first the motor's guard may be starting, or
+    /// a stop unconfirmed.
+    fn insist(&self, wish: Wish, mut is_true: impl FnMut(&View) -> Option<()>) -> Result<(), RunError> {
+        let desk = self.pump.desk();
+        for _ in 0..TRIES {
+            desk.wish(wish);
+            if desk.wait(BETWEEN, &mut is_true).is_some() {
                 return Ok(());
             }
         }
         let why = desk.see(|view| view.look.refused.map(|refused| refused.to_string()));
-        Err(failed(why.unwrap_or_else(|| "the motor could not be armed".to_owned())))
-    }
-
-    fn clock_now(&self) -> Seconds {
-        use crate::clock::Clock;
-        self.clock.now()
+        let why = why.unwrap_or_else(|| "the device does not follow".to_owned());
+        Err(RunError::Failed(format!("{}: {why}", self.port)))
     }
 
     /// The plant for the control cycle, within its limits.

@@ -8,6 +8,9 @@ use crate::backend::safety::warden;
 use crate::backend::wire::{Baud, Format};
 use crate::check::{Check, Checker};
 
+/// The largest command that a state of [`Format::Sensorsini31`] can repeat, in 16 bits.
+const MOST_REPEATED: u32 = 32_767;
+
 /// A cart-pole at the end of a wire.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -29,7 +32,7 @@ pub struct Params {
     pub hold_to_enable: bool,
     /// A calibration older than this must be done anew, days.
     pub calibration_days: f64,
-    /// A test starts with this part of the largest action,
+    /// A test of the robot alone starts with this part of the largest action,
     pub push: f64,
     /// for so long, s.
     pub push_s: f64,
@@ -80,6 +83,13 @@ impl Check for Params {
         c.range("upright_deg", self.upright_deg, 0.5..=45.0);
         self.centre.check(&mut c.section("centre"));
         self.scales.check(&mut c.section("scales"));
+        let full_scale = self.scales.motor.full_scale;
+        c.demand(
+            self.format != Format::Sensorsini31 || full_scale <= MOST_REPEATED,
+            "scales.motor.full_scale",
+            full_scale,
+            "at most 32767 with sensorsini31, whose states repeat the command in 16 bits",
+        );
         self.safety.check(&mut c.section("safety"));
         self.emulated.check(&mut c.section("emulated"));
     }
