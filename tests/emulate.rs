@@ -180,7 +180,8 @@ fn wrong_words_are_explained() {
     fs::write(&faults, "(to_host: (flip: 2.0))").unwrap();
     let faults = faults.to_str().unwrap();
     for (words, told) in [
-        (&["hovercraft"][..], "no device hovercraft: give physical-cart-pole, cobs-cart-pole"),
+        (&["hovercraft"][..], "there is no profile `hovercraft`"),
+        (&["balance"], "balance has no section `backend`, and so no device"),
         (&["cobs-cart-pole", "--faults", faults], "to_host.flip is 2, allowed: 0 to 1"),
         (&["cobs-cart-pole", "--faults", "/nonexistent"], "cannot read /nonexistent"),
     ] {
