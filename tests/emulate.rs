@@ -199,7 +199,7 @@ fn wrong_words_are_explained() {
     let faults = faults.to_str().unwrap();
     for (words, told) in [
         (&["hovercraft"][..], "there is no profile `hovercraft`"),
-        (&["balance"], "has no section `backend`"),
+        (&["balance"], "balance has no section `backend`, and so no device"),
         (&["cobs-cart-pole", "--faults", faults], "to_host.flip is 2, allowed: 0 to 1"),
         (&["cobs-cart-pole", "--faults", "/nonexistent"], "cannot read /nonexistent"),
     ] {

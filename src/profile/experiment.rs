@@ -22,6 +22,7 @@ use crate::task::swing_up::{self, SwingUp};
 /// A task with the parameters of its plant and its rules.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
+#[expect(clippy::large_enum_variant, reason = "a profile has one, and a program few profiles")]
 pub enum Experiment {
     /// Keep the pole up.
     Balance {

@@ -27,6 +27,9 @@ pub struct Params {
     pub slew_per_s: Option<f64>,
     /// Beyond this distance from the middle the action may only point inward, m.
     pub soft_limit_m: f64,
+    /// The same for a cart that would come there by itself within this time, s: it is not to roll
+    /// on to the hard limit.
+    pub coast_s: f64,
     /// Beyond this one the plant is stopped, m.
     pub hard_limit_m: f64,
     /// How far the pole may lean before the plant is stopped, degrees; `None`: all around.
@@ -48,6 +51,7 @@ impl Default for Params {
         Self {
             slew_per_s: Some(20.0),
             soft_limit_m: 0.17,
+            coast_s: 0.1,
             hard_limit_m: 0.188,
             angle_limit_deg: None,
             stale_periods: 3.0,
@@ -65,6 +69,7 @@ impl Check for Params {
             c.range("slew_per_s", slew, 0.1..=1000.0);
         }
         c.range("soft_limit_m", self.soft_limit_m, 0.001..=100.0);
+        c.range("coast_s", self.coast_s, 0.0..=2.0);
         c.range("hard_limit_m", self.hard_limit_m, 0.001..=100.0);
         c.demand(
             // One that is beyond its own range is told already.
@@ -370,12 +375,15 @@ impl Warden {
         if wanted.abs() <= from.abs() { wanted } else { wanted.clamp(from - step, from + step) }
     }
 
-    /// `wanted`, but beyond the soft limit only if it points inward.
+    /// `wanted`, but beyond the soft limit, or on the way there, only if it points inward.
     fn inward(&self, wanted: f64) -> f64 {
-        let position = self.last.as_ref().and_then(|seen| seen.state.first()).copied();
-        let Some(position) = position else { return 0.0 };
-        let is_beyond = position.abs() > self.params.soft_limit_m;
-        if is_beyond && wanted * position > 0.0 { 0.0 } else { wanted }
+        let Some([position, velocity, ..]) = self.last.as_ref().map(|seen| &seen.state[..]) else {
+            return 0.0;
+        };
+        let soft = self.params.soft_limit_m;
+        let rolls_to = position + velocity * self.params.coast_s;
+        let is_beyond = [*position, rolls_to].iter().any(|x| x.abs() > soft && wanted * x > 0.0);
+        if is_beyond { 0.0 } else { wanted }
     }
 
     /// What is wrong with the age of the latest state.
