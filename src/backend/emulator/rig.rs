@@ -189,7 +189,7 @@ impl Check for Params {
             self.angle.largest,
             "1 to 1e6",
         );
-        angle.demand(self.angle.sign.abs() == 1, "sign", self.angle.sign, "1 or -1");
+        angle.demand(self.angle.sign.abs() == 1, "sign", self.angle.sign, "-1 or 1");
     }
 }
 
