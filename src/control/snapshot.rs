@@ -167,6 +167,12 @@ impl Watcher {
         }
     }
 
+    /// What the countdown waits for, if it waits for the plant.
+    #[must_use]
+    pub fn waits(&self) -> Option<String> {
+        self.board.waits.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
     /// Asks for something that must not be passed over; waits while the queue is full.
     /// False when the control thread is gone.
     pub fn insist(&self, command: Command) -> bool {
@@ -193,6 +199,11 @@ impl Publisher {
     /// Adds a rollout that ended.
     pub fn rollout(&self, row: EpisodeRow) {
         self.board.rollouts.lock().unwrap_or_else(PoisonError::into_inner).push(row);
+    }
+
+    /// Says what the countdown waits for, or that it goes on.
+    pub fn waits(&self, what: Option<String>) {
+        *self.board.waits.lock().unwrap_or_else(PoisonError::into_inner) = what;
     }
 
     /// The next pending request.
