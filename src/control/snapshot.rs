@@ -153,12 +153,6 @@ impl Watcher {
         *self.board.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What the countdown waits for, if it does.
-    #[must_use]
-    pub fn waits(&self) -> Option<String> {
-        self.board.waits.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
     /// Appends to `known` the rollouts that ended since it was filled last.
     pub fn rollouts(&self, known: &mut Vec<EpisodeRow>) {
         let rollouts = self.board.rollouts.lock().unwrap_or_else(PoisonError::into_inner);
@@ -191,19 +185,14 @@ impl Publisher {
         *self.board.snapshot.lock().unwrap_or_else(PoisonError::into_inner) = *snapshot;
     }
 
-    /// Shows what the countdown waits for.
-    pub fn waits(&self, why: Option<String>) {
-        *self.board.waits.lock().unwrap_or_else(PoisonError::into_inner) = why;
+    /// Says what the countdown waits for, or that it goes on.
+    pub fn waits(&self, what: Option<String>) {
+        *self.board.waits.lock().unwrap_or_else(PoisonError::into_inner) = what;
     }
 
     /// Adds a rollout that ended.
     pub fn rollout(&self, row: EpisodeRow) {
         self.board.rollouts.lock().unwrap_or_else(PoisonError::into_inner).push(row);
-    }
-
-    /// Says what the countdown waits for, or that it goes on.
-    pub fn waits(&self, what: Option<String>) {
-        *self.board.waits.lock().unwrap_or_else(PoisonError::into_inner) = what;
     }
 
     /// The next pending request.

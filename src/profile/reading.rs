@@ -64,7 +64,8 @@ impl Keys {
         let text = text.unwrap_or_default();
         self.leaves.retain(|(path, _)| path != SECTION);
         for entry in scan::entries(&text).unwrap_or_default() {
-            let is_below = entry.path.strip_prefix(SECTION).is_some_and(|rest| rest.starts_with('.'));
+            let is_below =
+                entry.path.strip_prefix(SECTION).is_some_and(|rest| rest.starts_with('.'));
             if entry.is_section && (is_below || entry.path == SECTION) {
                 self.sections.push(entry.path);
             } else if is_below {
@@ -277,7 +278,8 @@ pub(super) fn keys_of(document: &Document, entries: &[Entry]) -> Result<Keys, Bo
         nearest(name, Experiment::NAMES.into_iter()).map(|near| format!("did you mean `{near}`?"))
     };
     let has_plant = entries.iter().any(|entry| entry.path == "backend" && entry.is_section);
-    let of = |name: &str| Keys::of(name).map(|keys| if has_plant { keys.with_plant() } else { keys });
+    let of =
+        |name: &str| Keys::of(name).map(|keys| if has_plant { keys.with_plant() } else { keys });
     if let Some(set) = document.sets().iter().rev().find(|set| set.key == KEY) {
         let name = set.value.trim().trim_matches('"');
         return of(name).ok_or_else(|| {

@@ -160,7 +160,7 @@ impl Stage {
             // The next session has a number and chance of its own.
             order: Order { trial: None, seed: None, ..order },
             notice: (!session.notices.is_empty()).then(|| session.notices.join("; ")),
-            plant: None,
+            plant: session.real.as_ref().map(|real| real.at_the_screen()),
         };
         self.shutdown.abort_on_signal(running.watcher.clone());
         self.last = None;
