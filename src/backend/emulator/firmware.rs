@@ -208,7 +208,10 @@ impl Stm32 {
             self.angle = self.wrap(self.angle as f32 + self.angle_change) as i32;
         } else {
             self.angle = read;
-            self.angle_change = change;
+            // From the guess before to this reading is no motion of the pole.
+            if !was_frozen {
+                self.angle_change = change;
+            }
         }
     }
 
