@@ -203,6 +203,12 @@ impl Page {
         }
     }
 
+    /// What is heard on every screen of a session with a real plant: its motor may be armed.
+    fn always(&self, key: KeyEvent) -> Option<Action> {
+        self.running.plant.as_ref()?;
+        keys::action(keys::Screen::Live, key).filter(|action| *action == Action::Stop)
+    }
+
     fn key(&mut self, key: KeyEvent) {
         let stage = self.running.watcher.look().stage;
         let here = match stage {
@@ -210,7 +216,8 @@ impl Page {
             Stage::Instruction(_) | Stage::Break { .. } => keys::Screen::Briefing,
             _ => keys::Screen::Live,
         };
-        let Some(action) = keys::action(here, key) else {
+        let action = keys::action(here, key).or_else(|| self.always(key));
+        let Some(action) = action else {
             if key.is_press() {
                 self.forget_question();
             }

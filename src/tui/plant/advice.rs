@@ -97,6 +97,9 @@ fn calibration(calibrating: &Calibrating) -> Advice {
         }
         Step::Failed => advice.key("c", "begin again").key("x", "leave it"),
         Step::Homing | Step::Done => advice,
+        Step::Steady => Advice { progress: Some(calibrating.progress), ..advice }
+            .key("m", "arm the motor")
+            .key("x", "end the calibration"),
         _ => Advice { progress: Some(calibrating.progress), ..advice },
     }
 }
