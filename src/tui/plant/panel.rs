@@ -8,6 +8,10 @@ use crate::tui::keys::Action;
 
 /// The page's own state.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "four facts that have nothing to do with another"
+)]
 pub struct Panel {
     is_open: bool,
     asks_home: bool,

@@ -14,7 +14,7 @@ pub(super) fn track(pen: &mut Pen<'_>, facts: &Facts, state: Option<State>) {
     // A mark is in the cell that its place lies in; the middle one is 0.
     let column = |x_m: f64| {
         let part = (x_m / half_m).clamp(-1.0, 1.0);
-        place(((part + 1.0) / 2.0 * f64::from(last)).round())
+        place((f64::midpoint(part, 1.0) * f64::from(last)).round())
     };
     pen.repeat(0, 0, "─", last + 1, Role::Dim);
     pen.text(column(0.0), 0, "┴", Role::Dim);
