@@ -169,7 +169,6 @@ impl Driver {
     }
 
     /// Whether a state came that waits for its command.
-    #[must_use]
     pub const fn owes_command(&self) -> bool {
         self.owes
     }

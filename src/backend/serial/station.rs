@@ -339,7 +339,11 @@ impl Station {
 
     fn arm(&mut self, now: Seconds) -> Result<(), NotArmed> {
         // What calibrates may be armed before it is calibrated: it is how that is done.
-        if !matches!(self.work, Work::Calibrate(_)) {
+        let calibrates = match &self.work {
+            Work::Calibrate(procedure) => procedure.trouble().is_none(),
+            _ => false,
+        };
+        if !calibrates {
             self.calibration()?;
             self.rest();
         }
