@@ -302,10 +302,12 @@ fn profiles_are_saved_never_over_another_unasked_and_opened_again() {
     assert!(std::fs::read_to_string(folder.path().join("mine.ron")).unwrap().contains("0.7"));
 
     desk.go(Field::Pole).type_text("0.8").go(Field::Profile).press(KeyCode::Left);
+    assert_eq!(desk.begin().command_line(), "coadapt run cobs-cart-pole");
+    desk.go(Field::Profile).press(KeyCode::Left);
     assert_eq!(desk.begin().command_line(), "coadapt run balance-modern");
     desk.go(Field::Profile).press(KeyCode::Left);
     assert_eq!(desk.begin().command_line(), "coadapt run balance");
-    desk.go(Field::Profile).right(2);
+    desk.go(Field::Profile).right(3);
     assert_eq!(desk.begin().command_line(), "coadapt run mine --set plant.pole_length_m=0.8");
 }
 
@@ -399,7 +401,7 @@ fn a_broken_profile_is_not_opened_and_not_in_the_way() {
     desk.go(Field::Profile).right(2);
     assert!(desk.shows("`mode` cannot be both"));
     assert_eq!(desk.setup.order().profile, "balance-modern");
-    desk.right(1);
+    desk.right(2);
     assert_eq!(desk.setup.order().profile, "last");
 }
 

@@ -109,7 +109,7 @@ fn every_fault_latches_with_its_name_and_only_a_person_arms_again() {
             }
         }),
         ("position jumped", |b| b.state[0] = -0.1),
-        ("angle jumped", |b| b.state[2] = 1.0),
+        ("angle jumped", |b| b.state[2] = 2.5),
         ("no state came", |b| b.now += 0.2),
         ("damaged frames", |b| (0..6).for_each(|_| b.warden.damaged(Seconds(b.now)))),
         ("was reset", |b| {
