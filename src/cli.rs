@@ -81,7 +81,7 @@ pub struct Run {
     #[arg(long, value_name = "OPERATOR", default_value = "keyboard")]
     pub operator: String,
     /// simulated, or serial:PORT for a real plant: a path, a name in /dev/serial/by-id, or
-    /// usb:VID:PID[:SERIAL].
+    /// `usb:VID:PID[:SERIAL]`.
     #[arg(long, value_name = "BACKEND", default_value = "simulated")]
     pub backend: String,
     /// Some of introduction,main,autonomous.

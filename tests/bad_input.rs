@@ -180,7 +180,11 @@ fn unknown_words_are_told_what_is_known() {
     refuses(&desk, &format!("{run} --operator simulated:naive:drunk"), &["drunk", "delayed"]);
     refuses(&desk, &format!("{RUN} --learner perceptron"), &["perceptron", "rfwr"]);
     refuses(&desk, &format!("{RUN} --mode both"), &["both", "sequential"]);
-    refuses(&desk, &format!("{RUN} --backend serial:/dev/x"), &["serial:/dev/x", "no section `backend`"]);
+    refuses(
+        &desk,
+        &format!("{RUN} --backend serial:/dev/x"),
+        &["serial:/dev/x", "no section `backend`"],
+    );
     refuses(&desk, &format!("{RUN} --backend warp"), &["warp", "simulated", "serial:PORT"]);
     refuses(&desk, &format!("{RUN} --arm"), &["--arm", "--backend serial:PORT"]);
     refuses(&desk, &format!("{RUN} --phases dance"), &["dance", "autonomous"]);
