@@ -154,7 +154,8 @@ mod measure {
         }
         let _ = process.kill();
         process.wait().unwrap();
-        let trace = stand.end();
+        let trace = stand.trace_since(began);
+        stand.end();
         is_there.then(|| stopped_after(began, &trace))
     }
 
@@ -168,9 +169,8 @@ mod measure {
     /// From `began` until the motor was off for good, ms.
     fn stopped_after(began: i64, trace: &[Line]) -> f64 {
         let motor = |line: &Line| line.motor().map(|command| (line.read_ns, command));
-        let after = trace.iter().filter_map(motor).filter(|(at, _)| *at >= began);
-        let off = after.rev().take_while(|(_, command)| *command == 0).last();
-        let (off, _) = off.unwrap_or((i64::MAX, 0));
+        let off = trace.iter().rev().filter_map(motor).take_while(|(_, command)| *command == 0);
+        let (off, _) = off.last().unwrap_or((i64::MAX, 0));
         #[expect(clippy::cast_precision_loss, reason = "milliseconds")]
         let took = (off - began) as f64 * 1e-6;
         took

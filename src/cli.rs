@@ -247,6 +247,9 @@ Examples:
 
 The first line on standard output is the port; with --json every line is an object with at_s and
 what: written (by the host), obeyed, delivered (to the host), motor, homing_began, fault, forbidden …
+On standard input, a line each: steady or an empty line (a hand brings the pole to hang at rest),
+raise (a hand holds it upright for 3 s), push N (a hand moves the cart by N cm while the motor is
+off), unplug S (the cable is pulled for S seconds), help.
 docs/SERIAL-PROTOCOL.md has the faults and what a host must never do. Ctrl-C ends.";
 
 /// The words of `emulate`.

@@ -8,6 +8,8 @@ mod evaluate;
 mod fit;
 #[cfg(unix)]
 mod guard;
+#[cfg(unix)]
+mod hands_on;
 pub mod outcome;
 mod pad_relay;
 mod panics;

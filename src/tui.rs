@@ -17,6 +17,7 @@ pub mod keys;
 pub mod live;
 pub mod palette;
 pub mod pen;
+pub mod plant;
 pub mod results;
 pub mod scene;
 pub mod sensitivity;

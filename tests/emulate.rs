@@ -192,6 +192,32 @@ fn a_cable_that_was_pulled_comes_back_under_the_same_link() {
 }
 
 #[test]
+fn a_hand_is_lent_on_standard_input() {
+    let mut command = coadapt(&["cobs-cart-pole", "--json"]);
+    let mut process = command.stdin(Stdio::piped()).spawn().unwrap();
+    let lines = b"\nraise\npush -5\nfly\nunplug 0.1\n";
+    process.stdin.take().unwrap().write_all(lines).unwrap();
+    let mut trace = BufReader::new(process.stdout.take().unwrap()).lines();
+    let mut hands = Vec::new();
+    // The cable that comes back after the end of input: that has ended nothing.
+    let mut ports = 0;
+    while ports < 2 {
+        let entry: Value = serde_json::from_str(&trace.next().unwrap().unwrap()).unwrap();
+        match entry["what"].as_str().unwrap() {
+            "hand" => hands.push(entry["hand"].to_string()),
+            "port" => ports += 1,
+            _ => {}
+        }
+    }
+    assert_eq!(hands, ["\"steady\"", "\"raise\"", "{\"push\":{\"by_m\":-0.05}}"]);
+    process.kill().unwrap();
+    let mut told = String::new();
+    process.stderr.take().unwrap().read_to_string(&mut told).unwrap();
+    process.wait().unwrap();
+    assert!(told.contains("`fly` is nothing that a hand can do"), "{told}");
+}
+
+#[test]
 fn wrong_words_are_explained() {
     let folder = tempfile::tempdir().unwrap();
     let faults = folder.path().join("faults.ron");

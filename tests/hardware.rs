@@ -13,7 +13,7 @@ use std::process::{Child, Command, ExitStatus, Output, Stdio};
 
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
-use stand::{Line, READY, Stand, soon};
+use stand::{Line, READY, Stand, monotonic, soon};
 
 const PROFILES: [&str; 2] = ["physical-cart-pole", "cobs-cart-pole"];
 
@@ -181,17 +181,18 @@ impl Driving {
         panic!("{profile}: no session came as far as to drive");
     }
 
-    /// What the device got until the signal, and then the session.
-    fn signal(&self, signal: Signal) -> usize {
+    /// Sends the session a signal while its motor is on, and tells when.
+    fn signal(&self, signal: Signal) -> i64 {
         soon("a moment with the motor on", || self.stand.motor() != 0);
+        let now = monotonic();
         kill_process(Pid::from_child(&self.process), signal).unwrap();
-        self.stand.trace().len()
+        now
     }
 
-    fn stops(&self, since: usize) {
+    fn stops(&self, since: i64) {
         soon("the stop", || {
-            let trace = self.stand.trace();
-            self.stand.motor() == 0 && trace.len() > since
+            self.stand.motor() == 0
+                && self.stand.trace_since(since).iter().any(|line| line.motor() == Some(0))
         });
     }
 
@@ -239,8 +240,7 @@ fn a_signal_that_ends_the_session_stops_the_motor_and_the_session_can_go_on() {
             let (ended, told) = driving.over();
             assert_eq!(ended.code(), Some(code), "{profile}: {told}");
             driving.stops(since);
-            let then = driving.stand.trace().len();
-            assert_stays_off(&driving.stand.trace()[since..then]);
+            assert_stays_off(&driving.stand.trace_since(since));
             assert_eq!(status(&session_folder(&driving.stand)), "interrupted");
             completes(&driving.stand);
             assert_peaceful(&driving.stand.trace());
@@ -261,17 +261,16 @@ fn a_session_that_is_killed_or_stands_still_has_a_guard_that_stops_the_motor() {
                 assert_eq!(driving.over().0.signal(), Some(9));
             } else {
                 // Whatever it was about to do, it finds out that it was stopped.
-                let held = driving.stand.trace().len();
+                let let_go = monotonic();
                 kill_process(Pid::from_child(&driving.process), Signal::CONT).unwrap();
                 let (ended, told) = driving.over();
                 assert_eq!(ended.code(), Some(1), "{profile} {signal:?}: {told}");
                 assert!(told.contains("stopped: "), "{told}");
-                let trace = driving.stand.trace();
-                assert_stays_off(&trace[since..]);
-                let drove = trace[held..].iter().filter_map(Line::motor).filter(|to| *to != 0);
+                let trace = driving.stand.trace_since(let_go);
+                let drove = trace.iter().filter_map(Line::motor).filter(|to| *to != 0);
                 assert!(drove.count() <= 1, "{profile} {signal:?}: it drove on");
             }
-            assert_stays_off(&driving.stand.trace()[since..]);
+            assert_stays_off(&driving.stand.trace_since(since));
             completes(&driving.stand);
             assert_peaceful(&driving.stand.trace());
         }

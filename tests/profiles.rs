@@ -306,6 +306,21 @@ fn a_set_of_a_key_that_the_text_lacks_is_added() {
 }
 
 #[test]
+fn a_real_plants_keys_are_set_and_refused_like_all_others() {
+    let mut document = Document::find("physical-cart-pole", &nowhere()).unwrap();
+    document.set("backend.safety.soft_limit_m", "0.15");
+    document.set("backend.emulated.motor.delay_s", "0.004");
+    let plant = document.read().unwrap().backend.unwrap();
+    assert_eq!((plant.safety.soft_limit_m, plant.emulated.motor.delay_s), (0.15, 0.004));
+    document.set("backend.safety.soft_limit", "0.15");
+    let told = message(&document);
+    assert!(told.contains("did you mean `backend.safety.soft_limit_m`"), "{told}");
+    let mut document = Document::find("swing-up", &nowhere()).unwrap();
+    document.set("backend.safety.soft_limit_m", "0.15");
+    assert!(message(&document).contains("unknown key"));
+}
+
+#[test]
 fn bad_sets_are_reported_together_with_the_files_faults() {
     let mut document = Document::from_text("x.ron", "(task: \"balance\", tick_ms: 0.0)");
     document.set("plant.pole_lenght_m", "0.6");

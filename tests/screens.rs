@@ -16,7 +16,8 @@ use coadapt::sharing::weight::Opened;
 use coadapt::signal::{End, Intent, Seconds, State, Tallied, Tick};
 use coadapt::task::swing_up;
 use coadapt::tui::live::{self, History, Info, Ui, View};
-use coadapt::tui::palette::{Glyphs, Look, Palette};
+use coadapt::tui::palette::{Glyphs, Look, Palette, Role};
+use coadapt::tui::plant::Badge;
 use coadapt::tui::results;
 use coadapt::tui::scene::Scene;
 use coadapt::tui::scene::cart_pole::Geometry;
@@ -302,6 +303,21 @@ fn before_the_gate() {
 #[test]
 fn the_countdown() {
     both("countdown", &info(), &hold(), &Ui::default());
+}
+
+#[test]
+fn a_real_plants_motor_and_what_its_countdown_waits_for() {
+    let motor = |words: &str, role| Some(Badge { words: words.to_owned(), role });
+    let mut ui = Ui { motor: motor("motor ARMED, hand on", Role::Go), ..Ui::default() };
+    small("motor_armed", &info(), &running(Phase::Main), &ui);
+    ui.motor = motor("motor ARMED: hold L1", Role::Strong);
+    ui.waits = Some("the pole does not come to rest: steady it by hand".to_owned());
+    small("motor_waits", &info(), &hold(), &ui);
+    ui.subject_view = true;
+    small("motor_waits_subject", &info(), &hold(), &ui);
+    ui.help_open = true;
+    let help = picture(80, 24, &info(), &hold(), &ui).to_string();
+    assert!(help.contains("o opens the page of the plant"), "{help}");
 }
 
 #[test]
@@ -722,6 +738,8 @@ proptest! {
             trouble: None,
             message: (flags & 8 == 0).then(|| "字".repeat(60)),
             tuned: (flags & 32 == 0).then_some(speed),
+            motor: None,
+            waits: (flags & 64 == 0).then(|| "字".repeat(60)),
             look: Look { glyphs, ..Look::default() },
         };
         let mut info = info();

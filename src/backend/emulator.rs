@@ -9,6 +9,7 @@ mod bench;
 mod firmware;
 
 pub mod faults;
+pub mod hand;
 pub mod homing;
 pub mod line;
 pub mod oracle;
@@ -24,6 +25,7 @@ use super::wire::{Baud, Format, cobs1, sensorsini31};
 use crate::random::{Place, Purpose, stream};
 use crate::signal::{Seconds, State};
 use faults::{Fault, Faults};
+use hand::Hand;
 use line::Line;
 use oracle::{Offence, Oracle};
 use rig::Rig;
@@ -169,6 +171,21 @@ impl Emulator {
     /// A host opens the port.
     pub fn connect(&mut self) {
         self.to_host.send_garbage(self.garbage_at_connect, self.now());
+    }
+
+    /// A person does something to the plant by hand. False where the motor does not let them.
+    pub fn hand(&mut self, hand: Hand) -> bool {
+        let is_done = self.rig.handle(hand);
+        if is_done {
+            self.trace.note(Event::Hand { hand });
+        }
+        is_done
+    }
+
+    /// A person pulls the cable, and puts it back after `time`.
+    pub fn pull(&mut self, time: Seconds) {
+        self.trace.note(Event::Fault { fault: Fault::Unplug { for_s: time.0 } });
+        self.unplug(self.now() + time);
     }
 
     /// The time since the start.

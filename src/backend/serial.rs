@@ -14,6 +14,7 @@ pub mod port;
 pub mod ports;
 #[cfg(unix)]
 pub mod pump;
+mod rest;
 pub mod scales;
 pub mod shelf;
 pub mod standing;

@@ -153,18 +153,18 @@ impl Watcher {
         *self.board.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What the countdown waits for, if it does.
-    #[must_use]
-    pub fn waits(&self) -> Option<String> {
-        self.board.waits.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
     /// Appends to `known` the rollouts that ended since it was filled last.
     pub fn rollouts(&self, known: &mut Vec<EpisodeRow>) {
         let rollouts = self.board.rollouts.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(new) = rollouts.get(known.len()..) {
             known.extend_from_slice(new);
         }
+    }
+
+    /// What the countdown waits for, if it waits for the plant.
+    #[must_use]
+    pub fn waits(&self) -> Option<String> {
+        self.board.waits.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Asks for something that must not be passed over; waits while the queue is full.
@@ -185,9 +185,9 @@ impl Publisher {
         *self.board.snapshot.lock().unwrap_or_else(PoisonError::into_inner) = *snapshot;
     }
 
-    /// Shows what the countdown waits for.
-    pub fn waits(&self, why: Option<String>) {
-        *self.board.waits.lock().unwrap_or_else(PoisonError::into_inner) = why;
+    /// Says what the countdown waits for, or that it goes on.
+    pub fn waits(&self, what: Option<String>) {
+        *self.board.waits.lock().unwrap_or_else(PoisonError::into_inner) = what;
     }
 
     /// Adds a rollout that ended.

@@ -72,7 +72,7 @@ impl Check for Params {
             is_free,
             "enable",
             self.enable,
-            "a letter without another meaning: b, c, e, g, i, j, k, n, u, w, y or z",
+            "a letter without another meaning: b, e, g, i, j, k, u, w or z",
         );
         self.shape.check(&mut c.section("shape"));
     }
@@ -88,7 +88,7 @@ impl Params {
 
 /// The keys that can be the dead-man switch: letters, which are the same with and without
 /// Shift, that neither steer nor are a key of a screen.
-pub const ENABLE_KEYS: &str = "bcegijknuwyz";
+pub const ENABLE_KEYS: &str = "begijkuwz";
 
 /// What is known of the keys.
 #[derive(Clone, Debug)]

@@ -57,6 +57,25 @@ impl Keys {
         Some(keys)
     }
 
+    /// With the keys of a real plant, for a profile that has one.
+    fn with_plant(mut self) -> Self {
+        const SECTION: &str = "backend";
+        let text = (self.reader)("(backend: ())").map(|profile| profile.to_ron());
+        let text = text.unwrap_or_default();
+        self.leaves.retain(|(path, _)| path != SECTION);
+        for entry in scan::entries(&text).unwrap_or_default() {
+            let is_below =
+                entry.path.strip_prefix(SECTION).is_some_and(|rest| rest.starts_with('.'));
+            if entry.is_section && (is_below || entry.path == SECTION) {
+                self.sections.push(entry.path);
+            } else if is_below {
+                let value = text.get(entry.value).unwrap_or_default().to_owned();
+                self.leaves.push((entry.path, value));
+            }
+        }
+        self
+    }
+
     /// `text` with the task's own defaults for the keys that it leaves out.
     fn complete(&self, mut text: String) -> String {
         let given = scan::entries(&text).unwrap_or_default();
@@ -258,9 +277,12 @@ pub(super) fn keys_of(document: &Document, entries: &[Entry]) -> Result<Keys, Bo
     let help = |name: &str| {
         nearest(name, Experiment::NAMES.into_iter()).map(|near| format!("did you mean `{near}`?"))
     };
+    let has_plant = entries.iter().any(|entry| entry.path == "backend" && entry.is_section);
+    let of =
+        |name: &str| Keys::of(name).map(|keys| if has_plant { keys.with_plant() } else { keys });
     if let Some(set) = document.sets().iter().rev().find(|set| set.key == KEY) {
         let name = set.value.trim().trim_matches('"');
-        return Keys::of(name).ok_or_else(|| {
+        return of(name).ok_or_else(|| {
             let message = format!("unknown task `{}`", clip(name));
             Box::new(fault(message, help(name), set.place(false)))
         });
@@ -273,7 +295,7 @@ pub(super) fn keys_of(document: &Document, entries: &[Entry]) -> Result<Keys, Bo
     };
     let value = source.get(entry.value.clone()).unwrap_or_default();
     let name = ron_options().from_str::<String>(value);
-    let known = name.as_deref().ok().and_then(Keys::of);
+    let known = name.as_deref().ok().and_then(of);
     known.ok_or_else(|| {
         let place = Place::Text(entry.value.clone());
         Box::new(match name {

@@ -1,14 +1,16 @@
 //! `coadapt emulate`: a device without hardware, in real time.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::hands_on::{self, Doing};
 use super::shutdown::Shutdown;
 use super::{RunError, signal_code, tell};
 use crate::backend::emulator::faults::Faults;
@@ -35,6 +37,9 @@ pub(super) fn emulate(words: &cli::Emulate) -> Result<ExitCode, RunError> {
         None => Faults::default(),
     };
     let shutdown = Shutdown::listen();
+    if io::stdin().is_terminal() {
+        tell(hands_on::HINT);
+    }
     let mut stand = Stand {
         device: Emulator::new(&params, &faults, words.seed),
         port: None,
@@ -43,6 +48,7 @@ pub(super) fn emulate(words: &cli::Emulate) -> Result<ExitCode, RunError> {
         clock: WallClock::start(),
         behind: Seconds(0.0),
         notes: Notes { json: words.json, is_read: true },
+        lines: hands_on::listen()?,
     };
     while stand.notes.is_read {
         if let Some(signal) = shutdown.signal() {
@@ -65,10 +71,15 @@ struct Stand {
     /// How long the device's time has stood still altogether.
     behind: Seconds,
     notes: Notes,
+    /// What is typed.
+    lines: Receiver<String>,
 }
 
 impl Stand {
     fn turn(&mut self) -> Result<(), RunError> {
+        while let Ok(line) = self.lines.try_recv() {
+            self.lend_a_hand(&line);
+        }
         self.plug()?;
         let written = self.hear().map_err(|error| broken(&error))?;
         self.stand_still()?;
@@ -80,6 +91,20 @@ impl Stand {
             }
         }
         self.notes.entries(&self.device.take_trace())
+    }
+
+    /// Does by hand what `line` says.
+    fn lend_a_hand(&mut self, line: &str) {
+        match line.parse() {
+            Ok(Doing::Hand(hand)) => {
+                if !self.device.hand(hand) {
+                    tell("the motor is on: nobody pushes the cart against it");
+                }
+            }
+            Ok(Doing::Unplug(time)) => self.device.pull(time),
+            Ok(Doing::Help) => tell(hands_on::HELP),
+            Err(why) => tell(&why),
+        }
     }
 
     /// The device's time now.

@@ -8,7 +8,7 @@ use super::session::{Company, usage};
 use crate::backend::safety::warden::Standing;
 use crate::backend::safety::{Limits, Safe};
 use crate::backend::serial::address::Address;
-use crate::backend::serial::desk::{Desk, Latency, View};
+use crate::backend::serial::desk::{Latency, View};
 use crate::backend::serial::driver::{Stage, Stopped};
 use crate::backend::serial::pump::{Place, Pump};
 use crate::backend::serial::station::{About, Wish};
@@ -21,6 +21,8 @@ use crate::profile::Profile;
 use crate::record::sidecar::{Lateness, Served};
 use crate::session::plan::Plan;
 use crate::signal::Seconds;
+use crate::tui::app::PlantDesk;
+use crate::tui::plant::Facts;
 
 /// The folder of calibrations, among the sessions: no subject's name begins with a dot.
 const SHELF: &str = ".calibrations";
@@ -40,6 +42,7 @@ pub(super) struct Real {
     manner: Manner,
     params: serial::Params,
     port: String,
+    half_track: Option<f64>,
 }
 
 /// The device that `backend` names; none for the simulated plant.
@@ -115,6 +118,7 @@ impl Real {
             .filter(|_| params.hold_to_enable)
             .and_then(|device| profile.operator.switch_name(device));
         let (tick, limit) = (profile.tick(), plant.force_limit_n);
+        let half_track = plant.track_length_m.map(|length| length / 2.0);
         let manner = Manner {
             limit,
             period: tick,
@@ -135,7 +139,7 @@ impl Real {
         let place = Place { address, shelf: logs.join(SHELF) };
         let pump = Pump::start(&params, place, about, clock)
             .map_err(|error| RunError::Failed(error.to_string()))?;
-        let real = Self { pump, clock, manner, params, port };
+        let real = Self { pump, clock, manner, params, port, half_track };
         if matches!(company, Company::Armed) {
             real.arm()?;
         }
@@ -157,7 +161,7 @@ impl Real {
         };
         waits(APPEARS, "the device does not become ready")?;
         desk.see(|view| view.look.calibrated.clone()).map_err(|why| {
-            failed(format!("{why}; run this profile once without --headless, and press d, c"))
+            failed(format!("{why}; run this profile once without --headless, and press o, then c"))
         })?;
         if !desk.see(|view| view.look.is_homed) {
             let begins = |view: &View| {
@@ -204,24 +208,21 @@ impl Real {
         Metronome::new(self.pump.desk().clone(), self.clock, self.manner.period)
     }
 
-    /// Where it is looked at and wished from.
-    pub(super) fn desk(&self) -> &Desk {
-        self.pump.desk()
-    }
-
-    /// Its port as the command line has it.
-    pub(super) fn port(&self) -> &str {
-        &self.port
-    }
-
-    /// What the profile says of it.
-    pub(super) const fn params(&self) -> &serial::Params {
-        &self.params
-    }
-
-    /// The switch that enables its motor.
-    pub(super) fn switch(&self) -> Option<&str> {
-        self.manner.switch.as_deref()
+    /// What the screen needs of it.
+    pub(super) fn at_the_screen(&self) -> PlantDesk {
+        let safety = &self.params.safety;
+        PlantDesk {
+            desk: self.pump.desk().clone(),
+            facts: Facts {
+                port: self.port.clone(),
+                format: self.params.format,
+                switch: self.manner.switch.clone(),
+                homing: self.params.homing,
+                soft_limit_m: safety.soft_limit_m,
+                hard_limit_m: safety.hard_limit_m,
+                half_track_m: self.half_track,
+            },
+        }
     }
 
     /// What `session.json` calls it.

@@ -8,6 +8,7 @@ use std::thread::JoinHandle;
 
 use super::outcome::Finished;
 use super::panics::{self, tell_later};
+use super::plant::Real;
 use super::session::{Company, Keys, Session};
 use super::shutdown::Shutdown;
 use super::{RunError, exit_code, sentences, signal_code, tell};
@@ -160,6 +161,7 @@ impl Stage {
             // The next session has a number and chance of its own.
             order: Order { trial: None, seed: None, ..order },
             notice: (!session.notices.is_empty()).then(|| session.notices.join("; ")),
+            plant: session.real.as_ref().map(Real::at_the_screen),
         };
         self.shutdown.abort_on_signal(running.watcher.clone());
         self.last = None;

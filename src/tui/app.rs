@@ -12,7 +12,8 @@ use std::time::Duration;
 use ratatui::crossterm::event::Event;
 
 use super::terminal::{Heard, Mouse, Screen};
-use super::{live, results, setup};
+use super::{live, plant, results, setup};
+use crate::backend::serial::desk::Desk;
 use crate::control::snapshot::Watcher;
 use crate::operator::Badge;
 use crate::profile::{self, Document, Order, ProfileError};
@@ -35,6 +36,17 @@ pub struct Running {
     pub order: Order,
     /// What the person should know before it begins.
     pub notice: Option<String>,
+    /// Its plant, where that is a real one.
+    pub plant: Option<PlantDesk>,
+}
+
+/// A session's real plant.
+#[derive(Clone, Debug)]
+pub struct PlantDesk {
+    /// Looks and wishes.
+    pub desk: Desk,
+    /// What stays the same.
+    pub facts: plant::Facts,
 }
 
 /// Does what the screens cannot: starts sessions, looks at the disk, hears signals.

@@ -10,7 +10,7 @@ const WIDTH: u16 = 72;
 
 /// Draws the keys of `screen`, for `hand`, and `notes` over what is there.
 pub fn draw(pen: &mut Pen<'_>, screen: Screen, hand: Hand, notes: &[String]) {
-    let bindings: Vec<_> = keys::of(screen).collect();
+    let bindings: Vec<_> = keys::of(screen).filter(|b| !b.shown.is_empty()).collect();
     let width = WIDTH.min(pen.width());
     let lines: Vec<String> =
         notes.iter().flat_map(|note| wrapped(note, usize::from(width.saturating_sub(4)))).collect();

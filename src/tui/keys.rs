@@ -17,12 +17,14 @@ pub enum Screen {
     Results,
     /// What is plugged in.
     Devices,
+    /// The real plant of a session.
+    Plant,
 }
 
 impl Screen {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::Setup, Self::Briefing, Self::Live, Self::Results, Self::Devices];
+    pub const ALL: [Self; 6] =
+        [Self::Setup, Self::Briefing, Self::Live, Self::Results, Self::Devices, Self::Plant];
 
     /// The heading in the help.
     #[must_use]
@@ -33,6 +35,7 @@ impl Screen {
             Self::Live => "live",
             Self::Results => "results",
             Self::Devices => "devices",
+            Self::Plant => "plant",
         }
     }
 }
@@ -80,6 +83,20 @@ pub enum Action {
     Progress,
     /// Show the scene only, or everything.
     SubjectView,
+    /// Show or hide the page of the real plant.
+    Plant,
+    /// Arm the plant's motor, or disarm it.
+    Arm,
+    /// Let the plant look for its ends.
+    Home,
+    /// Calibrate the plant.
+    Calibrate,
+    /// Yes to what is asked,
+    Yes,
+    /// or no.
+    No,
+    /// The fault was seen; or end a calibration.
+    Clear,
     /// Show or hide the keys.
     Help,
     /// Leave; asked once more during a session.
@@ -95,7 +112,7 @@ pub struct Binding {
     pub screen: Screen,
     /// Which keys; empty for keys that another part takes, listed for the help only.
     pub keys: &'static [KeyCode],
-    /// The keys in words.
+    /// The keys in words; empty: not in the table of the help.
     pub shown: &'static str,
     /// What they do, for the help.
     pub help: &'static str,
@@ -141,7 +158,7 @@ const fn elsewhere(
 pub const BINDINGS: &[Binding] = {
     use Action as A;
     use KeyCode::{BackTab, Char, Down, Enter, Esc, F, Left, Right, Tab, Up};
-    use Screen::{Briefing, Devices, Live, Results, Setup};
+    use Screen::{Briefing, Devices, Live, Plant, Results, Setup};
     &[
         bind(Setup, &[Tab, Down], "Tab ↓", "next", "to the next field", A::Next),
         bind(Setup, &[BackTab, Up], "Shift-Tab ↑", "", "to the field before", A::Previous),
@@ -157,6 +174,7 @@ pub const BINDINGS: &[Binding] = {
         bind(Setup, &[Char('q')], "q", "quit", "quit", A::Quit),
         //
         bind(Briefing, &[Enter], "Enter", "go on", "read, rested: go on", A::Begin),
+        bind(Briefing, &[Char('o')], "", "", "the page of the real plant", A::Plant),
         bind(Briefing, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
         bind(Briefing, &[Char('q')], "q", "end", "end the session (asks once)", A::Quit),
         //
@@ -184,6 +202,8 @@ pub const BINDINGS: &[Binding] = {
         bind(Live, &[Char('-')], "-", "", "lower it", A::LessSensitive),
         bind(Live, &[Char('p')], "p", "progress", "show or hide share and success", A::Progress),
         bind(Live, &[Char('v')], "v", "view", "the subject's view, or all", A::SubjectView),
+        // Only a session at a real plant has that page, and then the help says so.
+        bind(Live, &[Char('o')], "", "", "the page of the real plant", A::Plant),
         bind(Live, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
         bind(Live, &[Char('q')], "q", "end", "end the session (asks once)", A::Quit),
         //
@@ -202,6 +222,17 @@ pub const BINDINGS: &[Binding] = {
         elsewhere(Devices, "a d", "", "try the keyboard, on its page; also h l"),
         bind(Devices, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
         bind(Devices, &[Char('q'), Esc], "q", "quit", "quit", A::Quit),
+        //
+        bind(Plant, &[Char('m')], "m", "arm", "arm the motor, or disarm it", A::Arm),
+        bind(Plant, &[Char('f')], "f", "home", "find the ends of the track (asks first)", A::Home),
+        bind(Plant, &[Char('c')], "c", "calibrate", "calibrate, step by step", A::Calibrate),
+        bind(Plant, &[Char('y')], "y", "", "yes", A::Yes),
+        bind(Plant, &[Char('n')], "n", "", "no", A::No),
+        bind(Plant, &[Char('x')], "x", "clear", "clear a fault; end a calibration", A::Clear),
+        bind(Plant, &[Char(' ')], "space", "stop", "emergency stop", A::Stop),
+        bind(Plant, &[Char('o'), Esc], "o", "scene", "back to the scene; also Esc", A::Plant),
+        bind(Plant, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
+        bind(Plant, &[Char('q')], "q", "end", "end the session (asks once)", A::Quit),
     ]
 };
 
@@ -287,11 +318,10 @@ mod tests {
             assert!(of(screen).any(|b| b.action == Some(Action::Help)), "{}", screen.word());
             assert!(of(screen).any(|b| b.action == Some(Action::Quit)), "{}", screen.word());
         }
-        for steering in
-            ["hlad".chars().map(KeyCode::Char).collect(), vec![KeyCode::Left, KeyCode::Right]]
-                .concat()
-        {
-            assert!(of(Screen::Live).all(|binding| !binding.keys.contains(&steering)));
+        // The hands that steer go on steering under the plant's page.
+        for key in [Screen::Live, Screen::Plant].into_iter().flat_map(of).flat_map(|b| b.keys) {
+            let steers = direction(&KeyEvent::new(*key, KeyModifiers::NONE));
+            assert_eq!(steers, None, "{key}");
         }
         for letter in ENABLE_KEYS.chars() {
             let (small, large) = (KeyCode::Char(letter), letter.to_ascii_uppercase());

@@ -12,7 +12,7 @@ use super::keys::{Hand, Screen};
 use super::palette::{Look, Role};
 use super::pen::Pen;
 use super::scene::{Light, Scene, regions};
-use super::{briefing, help, small};
+use super::{briefing, help, plant, small};
 use crate::control::snapshot::Snapshot;
 use crate::operator::Device;
 use crate::record::EpisodeRow;
@@ -135,6 +135,10 @@ pub struct Ui {
     pub trouble: Option<String>,
     /// The sensitivity that was just turned, in the same place.
     pub tuned: Option<f64>,
+    /// The motor of a real plant; `None` where there is none.
+    pub motor: Option<plant::Badge>,
+    /// What the countdown waits for, in its place.
+    pub waits: Option<String>,
     /// Glyphs and colours.
     pub look: Look,
 }
@@ -148,6 +152,8 @@ impl Default for Ui {
             message: None,
             trouble: None,
             tuned: None,
+            motor: None,
+            waits: None,
             look: Look::default(),
         }
     }
@@ -297,7 +303,7 @@ fn page(pen: &mut Pen<'_>, view: &View<'_>) {
     }
     if view.ui.help_open {
         let screen = if is_briefing { Screen::Briefing } else { Screen::Live };
-        help::draw(pen, screen, view.hand(), &notes(view.info));
+        help::draw(pen, screen, view.hand(), &notes(view));
     }
 }
 
@@ -339,7 +345,14 @@ fn scene(pen: &mut Pen<'_>, view: &View<'_>) {
     let is_running = matches!(view.scene.stage, Stage::Running(_));
     let light = if is_running { Light::Go } else { Light::Wait };
     view.info.scene.draw(&mut pen.part(0, 0, width, height - 1), &view.scene.state, light);
+    if let Some(motor) = &view.ui.motor {
+        pen.text(1, 0, &motor.words, motor.role);
+    }
     if let Stage::Hold { moment, ticks_left } = view.scene.stage {
+        if let Some(waits) = &view.ui.waits {
+            let line = super::text::cut(&format!("WAIT  {waits}"), usize::from(width));
+            return pen.centred(height - 1, &line, Role::Wait);
+        }
         let info = view.info;
         let whole = if moment.phase.is_steered() { info.hold_s } else { info.autonomous_hold_s };
         let left = f64::from(ticks_left) * info.tick_s;
@@ -350,9 +363,13 @@ fn scene(pen: &mut Pen<'_>, view: &View<'_>) {
 }
 
 /// What the help says beside the keys.
-fn notes(info: &Info) -> Vec<String> {
+fn notes(view: &View<'_>) -> Vec<String> {
+    let info = view.info;
     let gate = super::text::fixed(info.gate * 100.0, 0, 0);
     let mut notes = Vec::new();
+    if view.ui.motor.is_some() {
+        notes.push("o opens the page of the plant: arm, home, calibrate.".to_owned());
+    }
     if !info.robot_watches && info.gate > 0.0 {
         let timer = if info.gate_is_timer {
             " With the thesis's window of 4000 steps that is a timer of about 2,300–2,600 steps \

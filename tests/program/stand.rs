@@ -78,7 +78,7 @@ impl Stand {
                 kept.lock().unwrap().push(Line { read_ns, entry });
             }
         });
-        let stand = Self {
+        let mut stand = Self {
             folder,
             program: program.to_owned(),
             profile,
@@ -87,7 +87,10 @@ impl Stand {
             trace,
             reader: Some(reader),
         };
-        soon("the port", || stand.trace().iter().any(|line| line.entry["what"] == "port"));
+        soon("the port", || {
+            assert_eq!(stand.device.try_wait().unwrap(), None, "no device");
+            stand.trace().iter().any(|line| line.entry["what"] == "port")
+        });
         stand.calibrate();
         stand
     }
@@ -150,6 +153,13 @@ impl Stand {
     pub fn motor(&self) -> i64 {
         let trace = self.trace.lock().unwrap();
         trace.iter().rev().find_map(Line::motor).unwrap_or(0)
+    }
+
+    /// The trace from `since` on, a time of [`monotonic`].
+    pub fn trace_since(&self, since: i64) -> Vec<Line> {
+        let mut trace = self.trace();
+        trace.retain(|line| line.read_ns >= since);
+        trace
     }
 
     /// Waits until the session of `process` drives the motor; false if it is over before.

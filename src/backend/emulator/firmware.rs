@@ -64,8 +64,6 @@ pub(super) struct Stm32 {
     angle: i32,
     angle_change: f32,
     frozen_until: u64,
-    /// The reading before, whether or not it was taken.
-    read_before: i32,
 }
 
 impl Stm32 {
@@ -104,7 +102,6 @@ impl Stm32 {
             angle: 0,
             angle_change: 0.0,
             frozen_until: 0,
-            read_before: 0,
         }
     }
 
@@ -198,8 +195,7 @@ impl Stm32 {
     #[expect(clippy::cast_precision_loss, reason = "some thousand counts")]
     fn measure(&mut self, now: u64, rig: &Rig) {
         let read = self.read_angle(rig);
-        let change = self.wrap((read - self.read_before) as f32);
-        self.read_before = read;
+        let change = self.wrap((read - self.angle) as f32);
         let jump = (change - self.angle_change).abs();
         let is_near = read.abs() < NEAR_GAP || self.angle.abs() < NEAR_GAP;
         let was_frozen = self.frozen_until > 0;
@@ -212,7 +208,10 @@ impl Stm32 {
             self.angle = self.wrap(self.angle as f32 + self.angle_change) as i32;
         } else {
             self.angle = read;
-            self.angle_change = change;
+            // From the guess before to this reading is no motion of the pole.
+            if !was_frozen {
+                self.angle_change = change;
+            }
         }
     }
 
@@ -394,7 +393,6 @@ impl Board for Stm32 {
         self.ends.middle = rig.read(Sensor::Position);
         self.apply(0, rig);
         self.angle = self.read_angle(rig);
-        self.read_before = self.angle;
     }
 
     fn receive(&mut self, byte: u8) {

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
+use super::hand::{Hand, Hold};
 use crate::check::{Check, Checker};
 use crate::plant::Plant;
 use crate::plant::cart_pole::{self, CartPole};
@@ -189,12 +190,13 @@ impl Check for Params {
             self.angle.largest,
             "1 to 1e6",
         );
-        angle.demand(self.angle.sign.abs() == 1, "sign", self.angle.sign, "1 or -1");
+        angle.demand(self.angle.sign.abs() == 1, "sign", self.angle.sign, "-1 or 1");
     }
 }
 
 /// The rig under way.
 pub struct Rig {
+    hand: Hold,
     params: Params,
     plant: CartPole,
     state: State,
@@ -227,6 +229,7 @@ impl Rig {
         let mut plant = CartPole::new(params.plant.clone(), STEP);
         plant.reseed(stream(seed, Purpose::Friction, Place::default()));
         Self {
+            hand: Hold::default(),
             plant,
             state: State::new(params.start),
             params: params.clone(),
@@ -257,6 +260,21 @@ impl Rig {
         self.state = state;
     }
 
+    /// A hand does something to the plant. False where it cannot: nobody moves the cart against
+    /// a motor that is on.
+    pub fn handle(&mut self, hand: Hand) -> bool {
+        if matches!(hand, Hand::Push { .. }) && self.is_driven() {
+            return false;
+        }
+        self.hand.take(hand);
+        true
+    }
+
+    /// Whether the motor is on, or is about to be.
+    fn is_driven(&self) -> bool {
+        self.command != 0 || self.coming.iter().any(|(_, command)| *command != 0)
+    }
+
     /// Puts `command` on the motor's pins from now on.
     pub fn drive(&mut self, command: i32) {
         self.coming.push_back((self.now + Seconds(self.params.motor.delay_s), command));
@@ -270,6 +288,9 @@ impl Rig {
             }
             let force = self.params.motor.force(self.command, self.state[1]);
             self.state = self.plant.step(&self.state, Action(force));
+            let reach = self.params.plant.track_length_m.map_or(f64::INFINITY, |m| m / 2.0);
+            let is_driven = self.is_driven();
+            self.state = self.hand.guide(self.state, self.now, reach, is_driven);
             self.now = self.now + STEP;
         }
     }

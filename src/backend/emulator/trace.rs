@@ -68,6 +68,11 @@ pub enum Event {
         /// Which.
         fault: super::faults::Fault,
     },
+    /// A person's hand is at the plant.
+    Hand {
+        /// What it does.
+        hand: super::hand::Hand,
+    },
     /// The host did what it must never do.
     Forbidden {
         /// What.

@@ -14,22 +14,10 @@
 //! at it, only the person knows; if not, all three signs are turned.
 
 use super::Params;
+use super::rest::{REST, Rest, around};
 use super::shelf::{Calibration, MadeFor};
 use crate::backend::wire::StateFrame;
 use crate::signal::Seconds;
-
-/// The pole's rest is measured over this many states,
-const STATES: u32 = 1000;
-/// or over at least this many
-const STATES_AT_LEAST: u32 = 400;
-/// once this time is over. At 50 Hz both come together; a faster device gives more states.
-const LONG_ENOUGH: Seconds = Seconds(8.0);
-/// A pole at rest stays within this part of a turn, half a degree,
-const REST_TURNS: f64 = 0.5 / 360.0;
-/// but is always allowed so many counts.
-const REST_COUNTS: f64 = 4.0;
-/// How long it must be at rest before the push.
-const REST: Seconds = Seconds(1.0);
 
 /// The push: this part of the largest action,
 const PUSH: f64 = 0.25;
@@ -470,11 +458,6 @@ fn lag_counts(turn: f64) -> f64 {
     (LAG_TURNS * turn).max(LAG_COUNTS)
 }
 
-/// `counts` within half a turn of 0.
-fn around(counts: f64, turn: f64) -> f64 {
-    counts - turn * (counts / turn).round()
-}
-
 impl Homing {
     /// What is wrong when a state comes at `now` from a device that is not homed.
     fn trouble(&mut self, now: Seconds) -> Option<Trouble> {
@@ -484,77 +467,6 @@ impl Homing {
             return Some(Trouble::NotHomed);
         }
         (now - since > HOME_WITHIN).then_some(Trouble::HomingRefused)
-    }
-}
-
-/// A pole that hangs at rest, or begins anew.
-#[derive(Clone, Copy, Debug)]
-struct Rest {
-    /// Counts of a full turn.
-    turn: f64,
-    /// The first reading and its time, and the latest time.
-    first: Option<(i32, Seconds)>,
-    now: Seconds,
-    count: u32,
-    /// Of the readings' distances from the first one, counts.
-    sum: f64,
-    low: f64,
-    high: f64,
-    was_disturbed: bool,
-}
-
-impl Rest {
-    const fn of(turn: f64) -> Self {
-        Self {
-            turn,
-            first: None,
-            now: Seconds(0.0),
-            count: 0,
-            sum: 0.0,
-            low: 0.0,
-            high: 0.0,
-            was_disturbed: false,
-        }
-    }
-
-    const fn begin_anew(&mut self) {
-        *self = Self { was_disturbed: true, ..Self::of(self.turn) };
-    }
-
-    fn see(&mut self, reading: i32, now: Seconds) {
-        let (first, _) = *self.first.get_or_insert((reading, now));
-        let away = around(f64::from(reading) - f64::from(first), self.turn);
-        self.now = now;
-        self.count += 1;
-        self.sum += away;
-        self.low = self.low.min(away);
-        self.high = self.high.max(away);
-        if self.high - self.low > (REST_TURNS * self.turn).max(REST_COUNTS) {
-            self.begin_anew();
-        }
-    }
-
-    /// How long it has been at rest.
-    fn time(&self) -> Seconds {
-        self.first.map_or(Seconds(0.0), |(_, since)| self.now - since)
-    }
-
-    /// Whether it moved a moment ago.
-    fn is_disturbed(&self) -> bool {
-        self.was_disturbed && self.time() < REST
-    }
-
-    /// The mean reading, near the first one.
-    fn mean(&self) -> f64 {
-        let first = self.first.map_or(0.0, |(first, _)| f64::from(first));
-        first + self.sum / f64::from(self.count.max(1))
-    }
-
-    /// How much of the measurement is done, 0 to 1.
-    fn measured(&self) -> f64 {
-        let count = f64::from(self.count);
-        let in_time = (count / f64::from(STATES_AT_LEAST)).min(self.time().0 / LONG_ENOUGH.0);
-        (count / f64::from(STATES)).max(in_time).clamp(0.0, 1.0)
     }
 }
 

@@ -14,8 +14,8 @@
 use super::Params;
 use super::greeting::{Greeting, Progress};
 use super::scales::{self, Tracker};
-use super::standing::stopped_by;
-pub use super::standing::{NotArmed, Stage, Stopped};
+pub use super::standing::{NotArmed, Received, Stage, Stopped};
+use super::standing::{STUCK, stopped_by};
 use crate::backend::safety::warden::{Fault, Observation, Standing, Wanted, Warden};
 use crate::backend::wire::{Codec, Counts, Flags, Format, Message, Order, Outcome, StateFrame};
 use crate::signal::{Seconds, State};
@@ -24,9 +24,6 @@ use crate::signal::{Seconds, State};
 const BURST: Seconds = Seconds(0.005);
 /// How long homing may take.
 const HOMING: Seconds = Seconds(30.0);
-/// What is said of homing that takes longer.
-const STUCK: &str = "homing does not end: switch the motor's supply off, then look whether the \
-    cart is stuck";
 /// A stop that the device has not confirmed after so many periods is said to be unconfirmed.
 const CONFIRMED_WITHIN: f64 = 3.0;
 
@@ -63,10 +60,7 @@ pub struct Driver {
     /// The latest state as it was on the wire.
     frame: Option<StateFrame>,
     out: Vec<u8>,
-    /// States that came,
-    states: u64,
-    /// and those that are missing.
-    lost: u64,
+    received: Received,
 }
 
 impl Driver {
@@ -94,8 +88,7 @@ impl Driver {
             stopped: Stopped::No,
             burst: None,
             damaged: 0,
-            states: 0,
-            lost: 0,
+            received: Received::default(),
             frame: None,
             out: Vec::new(),
         }
@@ -313,16 +306,10 @@ impl Driver {
         self.frame.as_ref()
     }
 
-    /// The states that came so far, of this and earlier connections.
+    /// The states that came, and those that did not, of this and earlier connections.
     #[must_use]
-    pub const fn states(&self) -> u64 {
-        self.states
-    }
-
-    /// The states that, by the device's own time, came from it and not to us.
-    #[must_use]
-    pub const fn lost_states(&self) -> u64 {
-        self.lost
+    pub const fn received(&self) -> Received {
+        self.received
     }
 
     /// From now on readings mean this. Not for an armed plant, which would jump.
@@ -377,7 +364,8 @@ impl Driver {
             }
             Stage::Ready => {
                 self.frame = Some(*frame);
-                self.count(device);
+                let before = self.warden.latest().and_then(|seen| seen.device);
+                self.received.count(before, device, self.period);
                 self.speed = state.get(1).copied().unwrap_or(0.0);
                 let held = Some(i64::from(frame.command));
                 let stopped = self.stopped_itself(frame);
@@ -396,19 +384,6 @@ impl Driver {
                 }
             }
             _ => {}
-        }
-    }
-
-    /// Counts the state that came at the device's time `at`, and those that are missing before it.
-    fn count(&mut self, at: Seconds) {
-        self.states += 1;
-        let before = self.warden.latest().and_then(|seen| seen.device);
-        let periods = before.map_or(1.0, |before| ((at - before).0 / self.period.0).round());
-        // Of longer gaps the device knows nothing: it started anew, or its clock did.
-        if (2.0..=50.0).contains(&periods) {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "2 to 50")]
-            let missing = periods as u64 - 1;
-            self.lost += missing;
         }
     }
 

@@ -211,10 +211,10 @@ impl Server {
         };
         match link.port.read(&mut buffer, patience) {
             Ok(read) => {
-                let states = self.station.driver().states();
+                let states = self.station.driver().received().states;
                 let now = self.clock.now();
                 self.station.read(&buffer[..read], now);
-                if self.station.driver().states() != states {
+                if self.station.driver().received().states != states {
                     self.seen_at = now;
                 }
             }

@@ -3,6 +3,11 @@
 use super::shelf::Uncalibrated;
 use crate::backend::safety::warden::Fault;
 use crate::backend::wire::Flags;
+use crate::signal::Seconds;
+
+/// What is said of homing that takes too long.
+pub(super) const STUCK: &str = "homing does not end: switch the motor's supply off, then look whether the \
+    cart is stuck";
 
 /// How far a device has come.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +33,30 @@ pub enum Stopped {
     Confirmed,
     /// It was told and does not say so.
     Unconfirmed,
+}
+
+/// States that came, and those that did not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Received {
+    /// Those that came.
+    pub states: u64,
+    /// Those that, by the device's own time, it sent and we did not get.
+    pub lost: u64,
+}
+
+impl Received {
+    /// A state came, of the device's time `at`; the one `before` it was `period` earlier, or some
+    /// are missing.
+    pub(super) fn count(&mut self, before: Option<Seconds>, at: Seconds, period: Seconds) {
+        self.states += 1;
+        let periods = before.map_or(1.0, |before| ((at - before).0 / period.0).round());
+        // Of longer gaps the device knows nothing: it started anew, or its clock did.
+        if (2.0..=50.0).contains(&periods) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "2 to 50")]
+            let missing = periods as u64 - 1;
+            self.lost += missing;
+        }
+    }
 }
 
 /// Why the motor stays off.

@@ -275,7 +275,7 @@ impl Station {
         if let Some(applied) = self.driver.answer(now) {
             self.applied = applied;
         }
-        self.answered = self.driver.states();
+        self.answered = self.driver.received().states;
     }
 
     /// What is to be written to the port now.
@@ -319,10 +319,10 @@ impl Station {
             is_enabled: self.is_enabled(now),
             refused: self.refused,
             latest: self.driver.latest(),
-            states: self.driver.states(),
+            states: self.driver.received().states,
             answered: self.answered,
             applied: self.applied,
-            lost: self.driver.lost_states(),
+            lost: self.driver.received().lost,
             counts: self.driver.counts(),
         }
     }

@@ -1,18 +1,21 @@
 //! The live screen at work: draws the latest snapshot, passes keys on.
 
+use std::io;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use ratatui::crossterm::event::{Event, KeyEvent};
 
-use super::{Conductor, End, Next, Running, hear};
+use super::{Conductor, End, Next, PlantDesk, Running, hear};
+use crate::backend::serial::station::Wish;
 use crate::clock::Clock;
 use crate::control::snapshot::{Command, Snapshot};
 use crate::session::Phase;
 use crate::session::machine::Stage;
-use crate::signal::Seconds;
+use crate::signal::{Seconds, Tick};
 use crate::tui::keys::{self, Action};
 use crate::tui::live::{self, History, Ui, View};
+use crate::tui::plant::{self, Badge, Pace, Panel};
 use crate::tui::sensitivity;
 use crate::tui::terminal::{Screen, look};
 
@@ -32,6 +35,8 @@ struct Page {
     panel: Snapshot,
     panel_due: Seconds,
     sample_due: Seconds,
+    /// What the page of a real plant remembers.
+    plant: Panel,
     /// Whether `q` was pressed once.
     asked_to_end: bool,
     /// How fast the session should run where nobody steers.
@@ -65,6 +70,7 @@ pub(super) fn show(
         panel,
         panel_due,
         sample_due,
+        plant: Panel::default(),
         asked_to_end: false,
         speed: SPEEDS[0],
         leaving: None,
@@ -130,18 +136,54 @@ impl Page {
             self.running.info.device_state = badge.state();
             self.ui.trouble = badge.trouble();
         }
+        screen.keep_mouse(self.running.mouse);
+        let drawn = match self.running.plant.clone() {
+            Some(plant) => self.draw_at(screen, &plant, &scene),
+            None => self.draw_session(screen, &scene),
+        };
+        if drawn.is_err() {
+            self.leave(End::Lost);
+        }
+        self.running.frames.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn draw_session(&self, screen: &mut Screen, scene: &Snapshot) -> io::Result<()> {
         let view = View {
             info: &self.running.info,
-            scene: &scene,
+            scene,
             panel: &self.panel,
             history: &self.history,
             ui: &self.ui,
         };
-        screen.keep_mouse(self.running.mouse);
-        if screen.draw(|frame| live::draw(frame, &view)).is_err() {
-            self.leave(End::Lost);
+        screen.draw(|frame| live::draw(frame, &view))
+    }
+
+    /// The session at a real plant, or the plant's own page over it.
+    fn draw_at(
+        &mut self,
+        screen: &mut Screen,
+        plant: &PlantDesk,
+        scene: &Snapshot,
+    ) -> io::Result<()> {
+        let view = plant.desk.view();
+        self.plant.see(&view.look);
+        self.ui.motor = Some(Badge::of(&view, &plant.facts));
+        self.ui.waits = self.running.watcher.waits();
+        if !self.plant.is_open() {
+            return self.draw_session(screen, scene);
         }
-        self.running.frames.fetch_add(1, Ordering::Relaxed);
+        let ticks = self.panel.tick != Tick(0);
+        let page = plant::Page {
+            view: &view,
+            facts: &plant.facts,
+            panel: &self.plant,
+            is_running: matches!(scene.stage, Stage::Running(_)),
+            pace: ticks.then_some(Pace { late: self.panel.lateness, missed: self.panel.missed }),
+            help_open: self.ui.help_open,
+            message: self.ui.message.as_deref(),
+            look: self.ui.look,
+        };
+        screen.draw(|frame| plant::draw(frame, &page))
     }
 
     fn sample(&mut self, scene: &Snapshot) {
@@ -161,13 +203,21 @@ impl Page {
         }
     }
 
+    /// What is heard on every screen of a session with a real plant: its motor may be armed.
+    fn always(&self, key: KeyEvent) -> Option<Action> {
+        self.running.plant.as_ref()?;
+        keys::action(keys::Screen::Live, key).filter(|action| *action == Action::Stop)
+    }
+
     fn key(&mut self, key: KeyEvent) {
         let stage = self.running.watcher.look().stage;
         let here = match stage {
+            _ if self.running.plant.is_some() && self.plant.is_open() => keys::Screen::Plant,
             Stage::Instruction(_) | Stage::Break { .. } => keys::Screen::Briefing,
             _ => keys::Screen::Live,
         };
-        let Some(action) = keys::action(here, key) else {
+        let action = keys::action(here, key).or_else(|| self.always(key));
+        let Some(action) = action else {
             if key.is_press() {
                 self.forget_question();
             }
@@ -184,7 +234,7 @@ impl Page {
             Action::Begin => self.ask(Command::Begin),
             Action::Pause => self.ask(Command::Pause),
             Action::Discard => self.ask(Command::Discard),
-            Action::Stop => self.ask(Command::Stop),
+            Action::Stop => self.stop(),
             Action::Faster => self.faster(),
             Action::MoreSensitive => self.tune(true),
             Action::LessSensitive => self.tune(false),
@@ -201,7 +251,24 @@ impl Page {
                     Some("q again ends the session; any other key goes on".to_owned());
             }
             Action::QuitNow => self.leave(End::Interrupted),
-            _ => {}
+            _ => self.wish(action),
+        }
+    }
+
+    /// The emergency stop: a real plant is told first, and not by the next tick.
+    fn stop(&mut self) {
+        if let Some(plant) = &self.running.plant {
+            plant.desk.wish(Wish::Stop);
+        }
+        self.ask(Command::Stop);
+    }
+
+    /// What a key asks of a real plant.
+    fn wish(&mut self, action: Action) {
+        let Some(plant) = &self.running.plant else { return };
+        let look = plant.desk.see(|view| view.look.clone());
+        for wish in self.plant.key(action, &look) {
+            plant.desk.wish(wish);
         }
     }
 
