@@ -62,7 +62,7 @@ mod measure {
     use rustix::process::{Pid, Signal, kill_process};
     use serde_json::Value;
 
-    use super::stand::{Line, READY, Stand, monotonic, soon};
+    use super::stand::{Line, Stand, monotonic, ready, soon};
     use super::victim::PANICS;
 
     const PROFILES: [&str; 2] = ["physical-cart-pole", "cobs-cart-pole"];
@@ -130,8 +130,9 @@ mod measure {
     /// How long the motor went on after `cause`, ms, which came so much `later` than any moment;
     /// `None` for a session that was over before, on a machine that was too busy.
     fn stop(profile: &'static str, cause: Cause, later: f64) -> Option<f64> {
-        let sets = [&READY[..], &["session.phases=[main]", "session.main_duration_s=60.0"]];
-        let stand = Stand::new(&program(), profile, &sets.concat(), "()");
+        let mut sets = ready(profile);
+        sets.extend(["session.phases=[main]", "session.main_duration_s=60.0"]);
+        let stand = Stand::new(&program(), profile, &sets, "()");
         let mut command = stand.armed_session();
         // A job of its own, as a shell starts it: what stops it can let it go on.
         command.process_group(0).stdin(Stdio::piped());
@@ -204,9 +205,9 @@ mod measure {
     fn rate(profile: &'static str, period_ms: u32, seconds: u32) -> Value {
         let tick = format!("tick_ms={period_ms}.0");
         let duration = format!("session.main_duration_s={seconds}.0");
-        let more = [tick.as_str(), duration.as_str(), "session.phases=[main]"];
-        let more = [&more[..], &["rules.rollout_s=3600.0"]].concat();
-        let stand = Stand::new(&program(), profile, &[&READY[..], &more].concat(), "()");
+        let mut sets = ready(profile);
+        sets.extend([&tick, &duration, "session.phases=[main]", "rules.rollout_s=3600.0"]);
+        let stand = Stand::new(&program(), profile, &sets, "()");
         let output = stand.armed_session().output().unwrap();
         let session = only_folder_in(&stand.folder.path().join("logs/anon"));
         let text =
@@ -217,6 +218,7 @@ mod measure {
 
     /// The one folder in `folder`.
     fn only_folder_in(folder: &Path) -> Option<PathBuf> {
-        Some(std::fs::read_dir(folder).ok()?.next()?.ok()?.path())
+        let entries = std::fs::read_dir(folder).ok()?.flatten();
+        entries.map(|entry| entry.path()).find(|path| path.is_dir())
     }
 }

@@ -19,13 +19,20 @@ use serde_json::Value;
 /// How long anything may take on a busy machine.
 pub const PATIENCE: Seconds = Seconds(60.0);
 
-/// A device that is in its middle and ready at once.
-pub const READY: [&str; 4] = [
-    "backend.homing=false",
-    "backend.start_s=0.1",
-    "backend.emulated.start=(0.0,0.0,3.141592653589793,0.0)",
-    "session.hold_s=0.0",
-];
+/// What is set for a device of `profile` that starts in its middle, and for a session that begins
+/// at once.
+pub fn ready(profile: &str) -> Vec<&'static str> {
+    let mut sets = vec![
+        "backend.start_s=0.1",
+        "backend.emulated.start=(0.0,0.0,3.141592653589793,0.0)",
+        "session.hold_s=0.0",
+    ];
+    // The other one is not armed before it has homed.
+    if profile == "physical-cart-pole" {
+        sets.push("backend.homing=false");
+    }
+    sets
+}
 
 /// A line of the trace.
 #[derive(Clone, Debug)]
