@@ -27,15 +27,26 @@ pub enum Status {
     Failed,
 }
 
-/// The lateness of the ticks, µs.
+/// How late something was, µs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lateness {
-    /// Half of the ticks were at most this late.
+    /// Half of all were at most this late.
     pub p50: u64,
-    /// 99 of 100 ticks were at most this late.
+    /// 99 of 100 were at most this late.
     pub p99: u64,
-    /// The latest tick.
+    /// The latest.
     pub max: u64,
+}
+
+/// How well a real plant and this program kept up with each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Served {
+    /// States that came,
+    pub states: u64,
+    /// and those that the plant's own time says are missing.
+    pub lost: u64,
+    /// From a state until its command was written, µs.
+    pub latency_us: Lateness,
 }
 
 /// How well the host kept time.
@@ -53,6 +64,9 @@ pub struct Timing {
     pub realtime_priority: bool,
     /// Frames drawn.
     pub screen_frames: u64,
+    /// The same of a real plant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plant: Option<Served>,
 }
 
 /// The machine and the terminal.
@@ -143,4 +157,22 @@ impl Document for Sidecar {
 /// When it is missing, cut off, not a session's, of a newer schema or holds a wrong value.
 pub fn read_sidecar(path: &Path) -> Result<Sidecar, Error> {
     document::read(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_timing_tells_of_a_real_plant_where_there_was_one() {
+        let simulated = Timing { ticks: 7, ..Timing::default() };
+        let text = serde_json::to_string(&simulated).unwrap();
+        assert!(!text.contains("plant"), "{text}");
+        let plant = Served { states: 9, lost: 1, latency_us: Lateness { p50: 1, p99: 2, max: 3 } };
+        let real = Timing { plant: Some(plant), ..simulated };
+        for timing in [simulated, real] {
+            let text = serde_json::to_string(&timing).unwrap();
+            assert_eq!(serde_json::from_str::<Timing>(&text).unwrap(), timing);
+        }
+    }
 }

@@ -12,7 +12,7 @@ use crate::control::scribe::Scribe;
 use crate::control::witness::Witness as _;
 use crate::learner::Model;
 use crate::profile::Profile;
-use crate::record::sidecar::{Lateness, Timing};
+use crate::record::sidecar::{Lateness, Served, Timing};
 use crate::record::{EpisodeRow, EvaluationRow, Sidecar, Status};
 use crate::report::achieved::{Achieved, Yardstick, yardstick};
 use crate::report::metrics::{self, MainEnd, Phases, RegionEnd};
@@ -97,6 +97,7 @@ pub(super) fn conclude(
     folder: PathBuf,
     outcome: Outcome<Scribe>,
     frames: u64,
+    plant: Option<Served>,
     signal: impl Fn() -> Option<i32>,
 ) -> Result<Finished, RunError> {
     let Outcome { finish, cause, interrupted, sharing, episodes, learned, refused, .. } = outcome;
@@ -146,10 +147,16 @@ pub(super) fn conclude(
         status,
         phases,
     };
-    let timing = outcome
-        .lateness_us
-        .filter(|histogram| !histogram.is_empty())
-        .map(|histogram| timing(&histogram, outcome.missed, lost_rows, frames));
+    let timing =
+        outcome.lateness_us.filter(|histogram| !histogram.is_empty()).map(|histogram| Timing {
+            ticks: histogram.len(),
+            missed: outcome.missed,
+            lost_rows,
+            lateness_us: lateness(&histogram),
+            realtime_priority: false,
+            screen_frames: frames,
+            plant,
+        });
     let last = Sidecar {
         status,
         ended: Some(clock::timestamp()),
@@ -214,18 +221,11 @@ fn tenth_means(task: &str, tenths: &[(u8, Model)], rows: &[(u8, EpisodeRow)]) ->
         .collect()
 }
 
-fn timing(histogram: &Histogram<u64>, missed: u64, lost_rows: u64, frames: u64) -> Timing {
-    Timing {
-        ticks: histogram.len(),
-        missed,
-        lost_rows,
-        lateness_us: Lateness {
-            p50: histogram.value_at_quantile(0.5),
-            p99: histogram.value_at_quantile(0.99),
-            max: histogram.max(),
-        },
-        realtime_priority: false,
-        screen_frames: frames,
+fn lateness(histogram: &Histogram<u64>) -> Lateness {
+    Lateness {
+        p50: histogram.value_at_quantile(0.5),
+        p99: histogram.value_at_quantile(0.99),
+        max: histogram.max(),
     }
 }
 

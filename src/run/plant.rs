@@ -8,7 +8,7 @@ use super::session::{Company, usage};
 use crate::backend::safety::warden::Standing;
 use crate::backend::safety::{Limits, Safe};
 use crate::backend::serial::address::Address;
-use crate::backend::serial::desk::View;
+use crate::backend::serial::desk::{Latency, View};
 use crate::backend::serial::driver::{Stage, Stopped};
 use crate::backend::serial::pump::{Place, Pump};
 use crate::backend::serial::station::{About, Wish};
@@ -18,6 +18,7 @@ use crate::backend::wire::Format;
 use crate::clock::{self, WallClock};
 use crate::operator::Choice;
 use crate::profile::Profile;
+use crate::record::sidecar::{Lateness, Served};
 use crate::session::plan::Plan;
 use crate::signal::Seconds;
 use crate::tui::app::PlantDesk;
@@ -232,9 +233,11 @@ impl Real {
         format!("{}, {calibrated}", look.device)
     }
 
-    /// Stops the motor and closes the port. A stop that is not confirmed is said aloud.
-    pub(super) fn close(self) {
+    /// Stops the motor and closes the port, and tells how well the plant was served. A stop that
+    /// is not confirmed is said aloud.
+    pub(super) fn close(self) -> Served {
         let format = self.params.format;
+        let desk = self.pump.desk().clone();
         match self.pump.close() {
             Stopped::Confirmed | Stopped::No => {}
             Stopped::Told | Stopped::Unconfirmed => tell_later(&format!(
@@ -242,7 +245,15 @@ impl Real {
                 out_of_reach(format)
             )),
         }
+        served(&desk.view())
     }
+}
+
+/// What a session keeps of how its plant was served.
+const fn served(view: &View) -> Served {
+    let Latency { p50_us: p50, p99_us: p99, max_us: max } = view.latency;
+    let latency_us = Lateness { p50, p99, max };
+    Served { states: view.look.states, lost: view.look.lost, latency_us }
 }
 
 /// What to do about a motor that nobody can reach.

@@ -317,15 +317,13 @@ impl Session {
         let clock = metronome.as_mut().map_or(clock, |metronome| metronome as &mut dyn Clock);
         let outcome = self.cycle.run(clock);
         // The motor first, then the last files.
-        if let Some(real) = self.real {
-            real.close();
-        }
+        let served = self.real.map(Real::close);
         let mut sidecar = self.sidecar;
         if let Some(device) = &self.device {
             device.tell(&mut sidecar);
         }
         let frames = self.frames.load(Ordering::Relaxed);
-        conclude(&self.profile, sidecar, self.folder, outcome, frames, signal)
+        conclude(&self.profile, sidecar, self.folder, outcome, frames, served, signal)
     }
 }
 

@@ -257,6 +257,23 @@ fn the_gap_of_the_potentiometer_freezes_the_angle_without_a_word() {
 }
 
 #[test]
+fn a_guess_in_the_gap_is_never_off_by_an_eighth_of_a_turn() {
+    for speed in [8.0, 9.0, 10.0, 12.0, 14.0] {
+        let mut params = Params::default();
+        params.rig.start = [0.0, 0.0, std::f64::consts::PI, speed];
+        let mut lab = Lab::with(&params, &Faults::default());
+        lab.order(Order::Stream(true), 10.0);
+        let turn = params.rig.angle.counts_per_turn;
+        let readings: Vec<i32> = lab.states().iter().map(|state| state.sensors[0]).collect();
+        assert!(readings.iter().any(|reading| reading.abs() < 100), "{speed}: never there");
+        for pair in readings.windows(2) {
+            let way = f64::from(pair[1] - pair[0]).rem_euclid(turn);
+            assert!(way.min(turn - way) < turn / 8.0, "{speed}: {pair:?}");
+        }
+    }
+}
+
+#[test]
 fn the_gains_setting_is_named_and_never_obeyed() {
     let mut lab = streaming();
     let mut set_pid = vec![0xAA, 0xC4, 28];
