@@ -41,6 +41,9 @@ pub enum RunError {
     /// It went wrong: exit code 1.
     #[error("{0}")]
     Failed(String),
+    /// A signal ended it before it began: exit code 128 + n.
+    #[error("ended by a signal before it began; the motor is off")]
+    Signal(i32),
 }
 
 /// Does what the command line says and returns the exit code: 0 done, 1 failed, 2 wrong
@@ -61,10 +64,11 @@ pub fn run() -> ExitCode {
         Ok(code) => code,
         Err(error) => {
             tell(&error.to_string());
-            ExitCode::from(match error {
-                RunError::Usage(_) => 2,
-                RunError::Failed(_) => 1,
-            })
+            match error {
+                RunError::Usage(_) => ExitCode::from(2),
+                RunError::Failed(_) => ExitCode::from(1),
+                RunError::Signal(signal) => signal_code(signal),
+            }
         }
     }
 }
@@ -98,7 +102,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
 /// A whole session on virtual time.
 fn headless(run: &crate::cli::Run) -> Result<ExitCode, RunError> {
     let shutdown = Shutdown::listen();
-    let company = if run.arm { Company::Armed } else { Company::Headless };
+    let company = if run.arm { Company::Armed(shutdown.clone()) } else { Company::Headless };
     let session = if let Some(folder) = &run.resume {
         Session::resume(folder, &company)?
     } else {
@@ -118,7 +122,8 @@ fn headless(run: &crate::cli::Run) -> Result<ExitCode, RunError> {
         say(&sentences(&finished).join("\n"))?;
     }
     // Nobody was there to end it: something went wrong.
-    let is_cut = finished.results.status == crate::record::Status::Aborted;
+    let is_cut =
+        finished.results.status == crate::record::Status::Aborted && finished.signal.is_none();
     Ok(if is_cut { ExitCode::from(1) } else { exit_code(&finished) })
 }
 

@@ -213,7 +213,7 @@ fn relay_socket(_path: &Path, _clock: WallClock) -> Result<Source, RunError> {
 fn attended<'a>(company: &'a Company, device: &str) -> Result<&'a Keys, RunError> {
     match company {
         Company::Attended(keys) => Ok(keys),
-        Company::Headless | Company::Armed => Err(RunError::Usage(format!(
+        Company::Headless | Company::Armed(_) => Err(RunError::Usage(format!(
             "a headless session has no {device}: give --operator simulated:average, script:FILE \
              or none; a session that was begun at the {device} is resumed without --headless"
         ))),

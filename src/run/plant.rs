@@ -5,6 +5,7 @@ use std::path::Path;
 use super::RunError;
 use super::panics::tell_later;
 use super::session::{Company, usage};
+use super::shutdown::Shutdown;
 use crate::backend::safety::warden::Standing;
 use crate::backend::safety::{Limits, Safe};
 use crate::backend::serial::address::Address;
@@ -15,7 +16,7 @@ use crate::backend::serial::station::{About, Wish};
 use crate::backend::serial::wired::{Manner, Metronome, Wired};
 use crate::backend::serial::{self};
 use crate::backend::wire::Format;
-use crate::clock::{self, WallClock};
+use crate::clock::{self, Clock, WallClock};
 use crate::operator::Choice;
 use crate::profile::Profile;
 use crate::record::sidecar::{Lateness, Served};
@@ -30,10 +31,10 @@ const SHELF: &str = ".calibrations";
 const APPEARS: Seconds = Seconds(10.0);
 /// to find its ends,
 const HOMES: Seconds = Seconds(45.0);
-/// What is not done at once is wished so many times,
-const TRIES: u32 = 15;
-/// with so much time between.
-const BETWEEN: Seconds = Seconds(0.2);
+/// and to follow.
+const ANSWERS: Seconds = Seconds(3.0);
+/// Looked at, and wished for again, after this time.
+const BETWEEN: Seconds = Seconds(0.1);
 
 /// A real plant at its port.
 pub(super) struct Real {
@@ -58,7 +59,7 @@ pub(super) fn chosen(
     let refused = |why: &str| Err(RunError::Usage(format!("--backend {backend}: {why}")));
     if backend == "simulated" {
         return match company {
-            Company::Armed => Err(RunError::Usage(
+            Company::Armed(_) => Err(RunError::Usage(
                 "--arm is for a real plant: add --backend serial:PORT, or leave it out".to_owned(),
             )),
             _ => Ok(None),
@@ -107,9 +108,9 @@ impl Real {
         };
         let clock = match company {
             Company::Attended(keys) => keys.clock,
-            Company::Headless | Company::Armed => WallClock::start(),
+            Company::Headless | Company::Armed(_) => WallClock::start(),
         };
-        if matches!(company, Company::Armed) {
+        if matches!(company, Company::Armed(_)) {
             // Who gave --arm stands beside it.
             params.hold_to_enable = false;
         }
@@ -140,58 +141,68 @@ impl Real {
         let pump = Pump::start(&params, place, about, clock)
             .map_err(|error| RunError::Failed(error.to_string()))?;
         let real = Self { pump, clock, manner, params, port, half_track };
-        if matches!(company, Company::Armed) {
-            real.arm()?;
+        if let Company::Armed(shutdown) = company {
+            real.arm(shutdown)?;
         }
         Ok(real)
     }
 
     /// Homes and arms a plant that nobody watches at a screen.
-    fn arm(&self) -> Result<(), RunError> {
+    fn arm(&self, shutdown: &Shutdown) -> Result<(), RunError> {
+        let is_ready = |view: &View| view.look.stage == Stage::Ready;
+        self.wait(shutdown, APPEARS, None, is_ready, "the device does not become ready")?;
         let desk = self.pump.desk();
-        let failed = |why: String| RunError::Failed(format!("{}: {why}", self.port));
-        let is_ready = |view: &View| (view.look.stage == Stage::Ready).then_some(());
-        let waits = |patience, what: &str| {
-            desk.wait(patience, is_ready).ok_or_else(|| {
-                failed(match desk.see(|view| view.look.stage.clone()) {
-                    Stage::Closed(why) => why,
-                    _ => what.to_owned(),
-                })
-            })
-        };
-        waits(APPEARS, "the device does not become ready")?;
         desk.see(|view| view.look.calibrated.clone()).map_err(|why| {
-            failed(format!("{why}; run this profile once without --headless, and press o, then c"))
+            self.failed(&format!(
+                "{why}; run this profile once without --headless, and press o, then c"
+            ))
         })?;
         if !desk.see(|view| view.look.is_homed) {
-            let begins = |view: &View| {
-                (view.look.stage == Stage::Homing || view.look.is_homed).then_some(())
-            };
-            self.insist(Wish::Home, begins)?;
-            desk.wait(HOMES, |view| view.look.is_homed.then_some(()))
-                .ok_or_else(|| failed("homing found no ends".to_owned()))?;
-            waits(APPEARS, "the device is not ready after homing")?;
+            let begins = |view: &View| view.look.stage == Stage::Homing || view.look.is_homed;
+            self.wait(shutdown, ANSWERS, Some(Wish::Home), begins, "homing does not begin")?;
+            let is_homed = |view: &View| view.look.is_homed;
+            self.wait(shutdown, HOMES, None, is_homed, "homing found no ends")?;
+            self.wait(shutdown, APPEARS, None, is_ready, "it is not ready after homing")?;
         }
-        self.insist(Wish::Arm, |view| (view.look.standing == Standing::Armed).then_some(()))
+        let is_armed = |view: &View| view.look.standing == Standing::Armed;
+        self.wait(shutdown, ANSWERS, Some(Wish::Arm), is_armed, "the motor does not follow")
     }
 
-    /// Wishes again and again until it comes true: at first the motor's guard may be starting, or
-    /// a stop unconfirmed.
-    fn insist(
+    /// Waits at most `patience` until something is true; wishes for it again and again, where a
+    /// wish helps: at first the motor's guard may be starting, or a stop unconfirmed.
+    fn wait(
         &self,
-        wish: Wish,
-        mut is_true: impl FnMut(&View) -> Option<()>,
+        shutdown: &Shutdown,
+        patience: Seconds,
+        wish: Option<Wish>,
+        is_true: impl Fn(&View) -> bool,
+        otherwise: &str,
     ) -> Result<(), RunError> {
         let desk = self.pump.desk();
-        for _ in 0..TRIES {
-            desk.wish(wish);
-            if desk.wait(BETWEEN, &mut is_true).is_some() {
+        let end = self.clock.now() + patience;
+        loop {
+            if let Some(signal) = shutdown.signal() {
+                return Err(RunError::Signal(signal));
+            }
+            if self.clock.now() >= end {
+                let look = desk.view().look;
+                let refused = look.refused.filter(|_| wish.is_some()).map(|why| why.to_string());
+                return Err(self.failed(&match look.stage {
+                    Stage::Closed(why) => why,
+                    _ => refused.unwrap_or_else(|| otherwise.to_owned()),
+                }));
+            }
+            if let Some(wish) = wish {
+                desk.wish(wish);
+            }
+            if desk.wait(BETWEEN, |view| is_true(view).then_some(())).is_some() {
                 return Ok(());
             }
         }
-        let why = desk.see(|view| view.look.refused.map(|refused| refused.to_string()));
-        let why = why.unwrap_or_else(|| "the device does not follow".to_owned());
-        Err(RunError::Failed(format!("{}: {why}", self.port)))
+    }
+
+    fn failed(&self, why: &str) -> RunError {
+        RunError::Failed(format!("{}: {why}", self.port))
     }
 
     /// The plant for the control cycle, within its limits.

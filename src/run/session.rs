@@ -11,6 +11,7 @@ use super::RunError;
 use super::choose::{Hand, assigned_mode, cut_off_notice, order_policy, steer};
 use super::outcome::{Finished, conclude};
 use super::plant::{self, Real};
+use super::shutdown::Shutdown;
 use crate::clock::{self, Clock, WallClock};
 use crate::control::cycle::{Crew, Cycle, Rules};
 use crate::control::scribe::{Device, Origin, Scribe, standing_of};
@@ -65,8 +66,9 @@ pub struct Session {
 pub enum Company {
     /// Nobody is there; virtual time.
     Headless,
-    /// Nobody is at a screen; a real plant, armed by who began it, and the wall's time.
-    Armed,
+    /// Nobody is at a screen; a real plant, armed by who began it, and the wall's time. A signal
+    /// ends it before it has begun.
+    Armed(Shutdown),
     /// A person at a screen; the wall's time.
     Attended(Keys),
 }
@@ -75,7 +77,7 @@ impl Company {
     const fn manner(&self) -> Manner {
         match self {
             Self::Headless => Manner::Virtual,
-            Self::Armed | Self::Attended(_) => Manner::Live,
+            Self::Armed(_) | Self::Attended(_) => Manner::Live,
         }
     }
 
@@ -86,7 +88,7 @@ impl Company {
     fn stamp(&self) -> fn() -> String {
         match self {
             Self::Headless => String::new,
-            Self::Armed | Self::Attended(_) => clock::timestamp,
+            Self::Armed(_) | Self::Attended(_) => clock::timestamp,
         }
     }
 }
@@ -244,6 +246,11 @@ impl Session {
         let moment = resumed.checkpoint.moment;
         let done = resumed.checkpoint.tenths;
         let standing = standing_of(resumed.checkpoint, frozen.map(|policy| policy.learner));
+        // A real plant cannot go on in the middle of its motion.
+        let standing = standing.map(|mut standing| {
+            standing.momentum = standing.momentum.filter(|_| real.is_none());
+            standing
+        });
         let Some(standing) = standing else {
             return Err(RunError::Failed(format!(
                 "{}: what was learned is missing (checkpoint.json and policy.json): this \

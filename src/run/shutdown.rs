@@ -83,8 +83,6 @@ impl Shutdown {
 fn halt() {
     let was_taken = is_taken();
     give_back();
-    // A command that was on its way meanwhile is not the last word.
-    last_resort::stop();
     // It halts as TSTP does, and like it only where somebody can let the program go on: STOP
     // would halt it for ever at a terminal without a shell.
     let _ = raise(SIGTTIN);

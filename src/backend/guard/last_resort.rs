@@ -42,6 +42,11 @@ pub fn stop() -> bool {
     HERE.stop()
 }
 
+/// A person arms the motor anew: that it was pulled is forgotten.
+pub fn forget() {
+    HERE.was_pulled.store(false, Ordering::SeqCst);
+}
+
 /// Whether somebody pulled it since it was armed: its owner must not drive on.
 #[must_use]
 pub fn was_pulled() -> bool {

@@ -383,7 +383,11 @@ impl Warden {
         let soft = self.params.soft_limit_m;
         let rolls_to = position + velocity * self.params.coast_s;
         let is_beyond = [*position, rolls_to].iter().any(|x| x.abs() > soft && wanted * x > 0.0);
-        if is_beyond { 0.0 } else { wanted }
+        // One that still rolls outward beyond it is braked.
+        let is_leaving = position.abs() > soft && velocity * position > 0.0;
+        let brake = if is_leaving { -position.signum() * BRAKE * self.limit } else { 0.0 };
+        let allowed = if is_beyond { 0.0 } else { wanted };
+        if allowed.abs() < brake.abs() { brake } else { allowed }
     }
 
     /// What is wrong with the age of the latest state.
@@ -451,6 +455,8 @@ impl Warden {
     }
 }
 
+/// A cart that rolls on beyond the soft limit is braked by this part of the largest action.
+const BRAKE: f64 = 0.6;
 /// A pause of the caller that no scheduler explains.
 const CLOCK_JUMP: Seconds = Seconds(1.0);
 

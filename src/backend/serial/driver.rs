@@ -11,6 +11,8 @@
 //!    └──── lost ───────┴──────────────────────────────────┘  └── arm: the warden's affair
 //! ```
 
+mod facts;
+
 use super::Params;
 use super::greeting::{Greeting, Progress};
 use super::scales::{self, Tracker};
@@ -18,7 +20,7 @@ pub use super::standing::{NotArmed, Received, Stage, Stopped};
 use super::standing::{STUCK, stopped_by};
 use crate::backend::safety::warden::{Fault, Observation, Standing, Wanted, Warden};
 use crate::backend::wire::{Codec, Counts, Flags, Format, Message, Order, Outcome, StateFrame};
-use crate::signal::{Seconds, State};
+use crate::signal::Seconds;
 
 /// Within this time a burst of stops is enough.
 const BURST: Seconds = Seconds(0.005);
@@ -205,8 +207,12 @@ impl Driver {
             Stage::Ready => return Err(NotArmed::NotHomed),
             _ => return Err(NotArmed::NotReady),
         }
+        if self.is_driven() {
+            return Err(NotArmed::Moving);
+        }
         self.warden.arm(now)?;
         self.wanted = None;
+        self.wants_home = false;
         self.follows = false;
         self.stopped = Stopped::No;
         self.stopping = None;
@@ -222,6 +228,13 @@ impl Driver {
 
     /// The emergency stop.
     pub fn emergency(&mut self, now: Seconds) {
+        self.latch(Fault::Stopped, now);
+    }
+
+    /// Somebody has just written a burst of stops past this driver: nothing else is written before
+    /// the device says what became of it.
+    pub fn was_stopped(&mut self, now: Seconds) {
+        self.burst = Some(now);
         self.latch(Fault::Stopped, now);
     }
 
@@ -244,13 +257,18 @@ impl Driver {
         if self.stage != Stage::Ready || self.warden.standing() == Standing::Armed {
             return Err(NotArmed::NotReady);
         }
-        // A command that is held would come back when homing ends; states say that it is 0.
-        if self.warden.latest().is_none_or(|seen| seen.held.is_some_and(|held| held != 0)) {
+        // A command that is held would come back when homing ends.
+        if self.warden.latest().is_none() || self.is_driven() {
             return Err(NotArmed::Moving);
         }
         self.wants_home = true;
         self.since = now;
         Ok(())
+    }
+
+    /// Whether the device holds a command, as far as it says.
+    fn is_driven(&self) -> bool {
+        self.warden.latest().is_some_and(|seen| seen.held.is_some_and(|held| held != 0))
     }
 
     /// Homing takes the place of a state's command: two different orders between two states
@@ -267,48 +285,6 @@ impl Driver {
     /// What is to be written to the port now.
     pub fn take_output(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.out)
-    }
-
-    /// How far the device has come.
-    #[must_use]
-    pub const fn stage(&self) -> &Stage {
-        &self.stage
-    }
-
-    /// What the guard allows.
-    #[must_use]
-    pub const fn standing(&self) -> Standing {
-        self.warden.standing()
-    }
-
-    /// Whether the ends of the track are known.
-    #[must_use]
-    pub const fn is_homed(&self) -> bool {
-        self.is_homed
-    }
-
-    /// Whether the motor is known to be off after a stop.
-    #[must_use]
-    pub const fn stopped(&self) -> Stopped {
-        self.stopped
-    }
-
-    /// The latest state, and when it came.
-    #[must_use]
-    pub fn latest(&self) -> Option<(State, Seconds)> {
-        self.warden.latest().map(|seen| (seen.state, seen.at))
-    }
-
-    /// The latest state as it was on the wire, in counts: what a calibration looks at.
-    #[must_use]
-    pub const fn frame(&self) -> Option<&StateFrame> {
-        self.frame.as_ref()
-    }
-
-    /// The states that came, and those that did not, of this and earlier connections.
-    #[must_use]
-    pub const fn received(&self) -> Received {
-        self.received
     }
 
     /// From now on readings mean this. Not for an armed plant, which would jump.
@@ -365,6 +341,10 @@ impl Driver {
                 self.frame = Some(*frame);
                 let before = self.warden.latest().and_then(|seen| seen.device);
                 self.received.count(before, device, self.period);
+                if before.is_some_and(|before| device < before) {
+                    // It started anew, wherever its cart stood.
+                    self.is_homed = !self.params.homing;
+                }
                 self.speed = state.get(1).copied().unwrap_or(0.0);
                 let held = Some(i64::from(frame.command));
                 let stopped = self.stopped_itself(frame);
@@ -430,7 +410,8 @@ impl Driver {
     fn stop(&mut self, now: Seconds) {
         // The first thing that a greeting says is that the motor stops; more would only get in
         // its way.
-        if self.stage == Stage::Opening {
+        // A board that homes takes no byte: it is stopped once it is done.
+        if matches!(self.stage, Stage::Opening | Stage::Homing) {
             return;
         }
         self.wants_home = false;
@@ -474,8 +455,8 @@ impl Driver {
 
     fn close(&mut self, now: Seconds, why: &str) {
         self.warden.disarm();
-        self.stage = Stage::Closed(why.to_owned());
         self.stop(now);
+        self.stage = Stage::Closed(why.to_owned());
     }
 
     /// Goes on with the greeting.

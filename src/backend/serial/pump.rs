@@ -24,6 +24,10 @@ use crate::signal::Seconds;
 const TURN: Seconds = Seconds(0.01);
 /// A device that is not there is looked for this often.
 const SEARCH: Seconds = Seconds(0.25);
+/// A device that was given up is greeted anew after this time.
+const AGAIN: Seconds = Seconds(2.0);
+/// A device that is not armed is given up after so long without a state.
+const SILENCE: Seconds = Seconds(1.0);
 /// How long a stop may take to be confirmed at the end.
 const FAREWELL: Seconds = Seconds(0.4);
 
@@ -150,8 +154,11 @@ impl Link {
 
 impl Drop for Link {
     fn drop(&mut self) {
-        // Whoever closes a port in order has stopped its motor before.
-        self.beat(Watch::Idle);
+        // Whoever closes a port in order has stopped its motor before; of a thread that failed
+        // nobody knows, and the guard stops it.
+        if !std::thread::panicking() {
+            self.beat(Watch::Idle);
+        }
         last_resort::disarm();
     }
 }
@@ -214,7 +221,8 @@ impl Server {
                 let states = self.station.driver().received().states;
                 let now = self.clock.now();
                 self.station.read(&buffer[..read], now);
-                if self.station.driver().received().states != states {
+                let is_ready = *self.station.driver().stage() == Stage::Ready;
+                if self.station.driver().received().states != states || !is_ready {
                     self.seen_at = now;
                 }
             }
@@ -236,6 +244,23 @@ impl Server {
         self.heed_last_resort();
         self.beat();
         self.keep_calibration();
+        self.give_up();
+    }
+
+    /// A device that is not what it should be, or sends nothing any more, is greeted anew after a
+    /// pause: its supply may just have come on.
+    fn give_up(&mut self) {
+        let driver = self.station.driver();
+        let is_silent = *driver.stage() == Stage::Ready
+            && driver.standing() != Standing::Armed
+            && self.clock.now() - self.seen_at > SILENCE;
+        let why = match driver.stage() {
+            Stage::Closed(why) if self.link.is_some() => why.clone(),
+            _ if is_silent => "the device sends no states: look at its power".to_owned(),
+            _ => return,
+        };
+        self.lose(&why);
+        self.next_search = self.clock.now() + AGAIN;
     }
 
     /// Does what was asked.
@@ -245,6 +270,11 @@ impl Server {
             match ask {
                 Ask::Wish(Wish::Arm) if !self.is_guarded() => {
                     self.station.refuse(NotArmed::Unguarded);
+                }
+                Ask::Wish(Wish::Arm) => {
+                    // A person arms anew, after whatever stopped the motor.
+                    last_resort::forget();
+                    self.station.obey(Wish::Arm, now);
                 }
                 Ask::Wish(wish) => self.station.obey(wish, now),
                 Ask::Want(action, at) => self.station.want(action, at),
@@ -275,6 +305,11 @@ impl Server {
                 if let Ok(copy) = port.as_fd().try_clone_to_owned() {
                     last_resort::arm(copy, &self.stop);
                 }
+                let device = self.place.address.identity(&self.host, &path);
+                match shelf::load(&self.place.shelf, &device) {
+                    Ok(found) => self.station.meet(device, found),
+                    Err(error) => return self.station.lost(error.to_string()),
+                }
                 self.desk.hang(Some(Box::new(bell)));
                 self.link = Some(Link { port, guard });
                 self.station.opened(self.clock.now());
@@ -285,6 +320,9 @@ impl Server {
 
     /// The device is gone: its port is closed at once, or it would come back under another name.
     fn lose(&mut self, why: &str) {
+        if self.station.driver().standing() == Standing::Armed {
+            last_resort::stop();
+        }
         self.link = None;
         self.desk.hang(None);
         self.station.lost(why);
@@ -294,6 +332,10 @@ impl Server {
     fn flush(&mut self) {
         let output = self.station.take_output();
         let Some(link) = &self.link else { return };
+        if *self.station.driver().stage() == Stage::Homing {
+            // From the order on, not a byte more.
+            last_resort::set_mute(true);
+        }
         if let Err(lost) = link.port.write(&output) {
             self.lose(&lost.to_string());
         }
@@ -302,8 +344,7 @@ impl Server {
     /// Somebody has stopped the motor past this thread: it must not drive on.
     fn heed_last_resort(&mut self) {
         if last_resort::was_pulled() && self.station.driver().standing() == Standing::Armed {
-            self.station.obey(Wish::Stop, self.clock.now());
-            self.flush();
+            self.station.was_stopped(self.clock.now());
         }
     }
 

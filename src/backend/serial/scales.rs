@@ -152,6 +152,8 @@ impl Params {
             0.0
         };
         let duty = (part.clamp(-1.0, 1.0) * gain + friction).clamp(-most, most);
+        // What makes up for friction turns no push around.
+        let duty = if duty * part > 0.0 { duty } else { 0.0 };
         let duty = if invert { -duty } else { duty };
         #[expect(clippy::cast_possible_truncation, reason = "within the full scale")]
         let command = (duty * f64::from(full_scale)) as i32;

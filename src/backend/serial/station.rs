@@ -248,6 +248,22 @@ impl Station {
         self.refused = Some(why);
     }
 
+    /// The device whose port was just opened is called `device`; `found` is its calibration.
+    pub fn meet(&mut self, device: String, found: Option<Calibration>) {
+        if device == self.about.device {
+            return;
+        }
+        self.about.device = device;
+        self.about.found = found;
+        self.driver.set_scales(&calibrated(&self.params, self.about.found.as_ref()).scales);
+    }
+
+    /// Somebody has written a stop past this station.
+    pub fn was_stopped(&mut self, now: Seconds) {
+        self.cancel();
+        self.driver.was_stopped(now);
+    }
+
     /// Nobody would stop the motor any more if this program died.
     pub fn unguarded(&mut self, now: Seconds) {
         self.driver.latch(Fault::Unguarded, now);
