@@ -24,6 +24,8 @@ use crate::signal::Seconds;
 const TURN: Seconds = Seconds(0.01);
 /// A device that is not there is looked for this often.
 const SEARCH: Seconds = Seconds(0.25);
+/// A board that is busy takes so long to look at a stop, and its buffer does not hold two.
+const QUIET: Seconds = Seconds(0.005);
 /// How long a stop may take to be confirmed at the end.
 const FAREWELL: Seconds = Seconds(0.4);
 
@@ -302,6 +304,7 @@ impl Server {
     /// Somebody has stopped the motor past this thread: it must not drive on.
     fn heed_last_resort(&mut self) {
         if last_resort::was_pulled() && self.station.driver().standing() == Standing::Armed {
+            self.clock.wait_until(self.clock.now() + QUIET);
             self.station.obey(Wish::Stop, self.clock.now());
             self.flush();
         }
