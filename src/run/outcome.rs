@@ -91,6 +91,7 @@ impl Results {
 }
 
 /// Evaluates, measures and writes the last files.
+#[expect(clippy::too_many_arguments, reason = "called once, with all that a session leaves behind")]
 pub(super) fn conclude(
     profile: &Profile,
     sidecar: Sidecar,
@@ -107,7 +108,8 @@ pub(super) fn conclude(
     let mut status = match (finish, &fault) {
         (_, Some(_)) => Status::Failed,
         (Finish::Complete, None) => Status::Complete,
-        (Finish::Aborted, None) if interrupted => Status::Interrupted,
+        // The stop that a signal gives a real plant may end the session before the signal does.
+        (Finish::Aborted, None) if interrupted || signal().is_some() => Status::Interrupted,
         (Finish::Aborted, None) => Status::Aborted,
     };
     let mut means = Vec::new();

@@ -8,8 +8,13 @@ use signal_hook::iterator::Signals;
 use signal_hook::low_level::{emulate_default_handler, raise, signal_name};
 
 use crate::backend::guard::last_resort;
+use crate::clock::{Clock, WallClock};
 use crate::control::snapshot::{Command, Watcher};
+use crate::signal::Seconds;
 use crate::tui::terminal::{give_back, is_taken, take_again};
+
+/// The port's thread has stopped the motor after so long; if not, the guard is about to.
+const LAST_WORD: Seconds = Seconds(0.04);
 
 /// Remembers the signal that asked the program to end.
 #[derive(Clone, Debug, Default)]
@@ -83,6 +88,9 @@ impl Shutdown {
 fn halt() {
     let was_taken = is_taken();
     give_back();
+    // A command that was on its way meanwhile is not the last word: that is the port's thread's.
+    // Another stop from here might meet its stop in the board's buffer, which does not hold both.
+    WallClock::start().wait_until(LAST_WORD);
     // It halts as TSTP does, and like it only where somebody can let the program go on: STOP
     // would halt it for ever at a terminal without a shell.
     let _ = raise(SIGTTIN);

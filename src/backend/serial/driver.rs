@@ -231,13 +231,6 @@ impl Driver {
         self.latch(Fault::Stopped, now);
     }
 
-    /// Somebody has just written a burst of stops past this driver: nothing else is written before
-    /// the device says what became of it.
-    pub fn was_stopped(&mut self, now: Seconds) {
-        self.burst = Some(now);
-        self.latch(Fault::Stopped, now);
-    }
-
     /// Stops the motor for `fault`, which stays until a person has seen it.
     pub fn latch(&mut self, fault: Fault, now: Seconds) {
         self.warden.latch(fault);

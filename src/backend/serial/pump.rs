@@ -28,6 +28,8 @@ const SEARCH: Seconds = Seconds(0.25);
 const AGAIN: Seconds = Seconds(2.0);
 /// A device that is not armed is given up after so long without a state.
 const SILENCE: Seconds = Seconds(1.0);
+/// A board that is busy takes so long to look at a stop, and its buffer does not hold two.
+const QUIET: Seconds = Seconds(0.005);
 /// How long a stop may take to be confirmed at the end.
 const FAREWELL: Seconds = Seconds(0.4);
 
@@ -344,7 +346,9 @@ impl Server {
     /// Somebody has stopped the motor past this thread: it must not drive on.
     fn heed_last_resort(&mut self) {
         if last_resort::was_pulled() && self.station.driver().standing() == Standing::Armed {
-            self.station.was_stopped(self.clock.now());
+            self.clock.wait_until(self.clock.now() + QUIET);
+            self.station.obey(Wish::Stop, self.clock.now());
+            self.flush();
         }
     }
 

@@ -258,12 +258,6 @@ impl Station {
         self.driver.set_scales(&calibrated(&self.params, self.about.found.as_ref()).scales);
     }
 
-    /// Somebody has written a stop past this station.
-    pub fn was_stopped(&mut self, now: Seconds) {
-        self.cancel();
-        self.driver.was_stopped(now);
-    }
-
     /// Nobody would stop the motor any more if this program died.
     pub fn unguarded(&mut self, now: Seconds) {
         self.driver.latch(Fault::Unguarded, now);
