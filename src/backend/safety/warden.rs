@@ -116,6 +116,14 @@ pub enum Fault {
     /// The angle moved further than anything could.
     #[error("the angle jumped by {0:.0}° between two states: look at the angle sensor")]
     AngleJump(f64),
+    /// The position is exactly the same for long, though the cart is pushed.
+    #[error(
+        "the cart does not move though it is pushed: look at the encoder, the belt and the supply"
+    )]
+    PositionStuck,
+    /// The angle is exactly the same, though the cart has moved far.
+    #[error("the angle does not change though the cart moves: look at the angle sensor")]
+    AngleStuck,
     /// The device holds another command than was sent.
     #[error("the device holds the command {held} in place of {sent}: look at its firmware")]
     Echo {
@@ -201,6 +209,16 @@ pub struct Warden {
     /// States in a row whose held command was none of these.
     wrong_echoes: u32,
     damaged: Vec<Seconds>,
+    stuck: Stuck,
+}
+
+/// What suggests that a sensor is stuck.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stuck {
+    /// How long the cart was pushed without a change of its position.
+    pushed: Seconds,
+    /// How far the cart has moved without a change of the angle, m.
+    moved: f64,
 }
 
 impl Warden {
@@ -218,6 +236,7 @@ impl Warden {
             sent: [None; 2],
             wrong_echoes: 0,
             damaged: Vec::with_capacity(REMEMBERED),
+            stuck: Stuck::default(),
         }
     }
 
@@ -246,6 +265,7 @@ impl Warden {
         self.judge_age(now).map_or(Ok(()), Err)?;
         self.judge_place(&last.state).map_or(Ok(()), Err)?;
         self.standing = Standing::Armed;
+        self.stuck = Stuck::default();
         self.action = 0.0;
         self.wrong_echoes = 0;
         Ok(())
@@ -286,7 +306,8 @@ impl Warden {
     /// A state came.
     pub fn observe(&mut self, seen: Observation) {
         self.pass(seen.at);
-        let fault = self.judge_state(&seen).or_else(|| self.judge_echo(&seen));
+        let stuck = self.judge_sensors(&seen);
+        let fault = self.judge_state(&seen).or_else(|| self.judge_echo(&seen)).or(stuck);
         self.last = Some(seen);
         if let Some(fault) = fault {
             self.trip(fault);
@@ -422,9 +443,11 @@ impl Warden {
             return wrong;
         };
         if let (Some(before), Some(now)) = (last.device, seen.device)
-            && now < before
+            && let passed = (now - before).0
+            && !(passed > 0.0 && passed <= CLOCK_JUMP.0)
         {
-            return Some(Fault::Reset);
+            // Ahead of us it is when this computer slept: its own clock does not count that.
+            return Some(if passed > 0.0 { Fault::Clock(passed) } else { Fault::Reset });
         }
         let change = |index: usize| {
             let value = |state: &State| state.get(index).copied().unwrap_or(0.0);
@@ -441,6 +464,27 @@ impl Warden {
         wrong
     }
 
+    /// What is wrong with sensors whose readings do not change at all.
+    fn judge_sensors(&mut self, seen: &Observation) -> Option<Fault> {
+        let last = self.last.as_ref()?;
+        let (&[x, _, theta, ..], &[x_before, _, theta_before, ..]) =
+            (&seen.state[..], &last.state[..])
+        else {
+            return None;
+        };
+        let is_pushed = self.action.abs() > PUSHED * self.limit;
+        let stands = x == x_before && x.abs() < self.params.soft_limit_m;
+        let Stuck { pushed, moved } = self.stuck;
+        self.stuck = Stuck {
+            pushed: if is_pushed && stands { pushed + self.period } else { Seconds(0.0) },
+            moved: if theta == theta_before { moved + (x - x_before).abs() } else { 0.0 },
+        };
+        if self.stuck.pushed > STUCK_FOR {
+            return Some(Fault::PositionStuck);
+        }
+        (self.stuck.moved > STUCK_OVER_M).then_some(Fault::AngleStuck)
+    }
+
     /// What is wrong with the command that the device holds. One that was sent a moment ago
     /// may not have arrived yet.
     fn judge_echo(&mut self, seen: &Observation) -> Option<Fault> {
@@ -455,6 +499,12 @@ impl Warden {
     }
 }
 
+/// A cart that is pushed with this part of the largest action moves,
+const PUSHED: f64 = 0.3;
+/// within this time.
+const STUCK_FOR: Seconds = Seconds(0.5);
+/// A pole hangs no more still than this while its cart moves, m.
+const STUCK_OVER_M: f64 = 0.15;
 /// A cart that rolls on beyond the soft limit is braked by this part of the largest action.
 const BRAKE: f64 = 0.6;
 /// A pause of the caller that no scheduler explains.

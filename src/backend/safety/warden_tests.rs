@@ -97,7 +97,7 @@ fn an_action_is_saturated_slewed_and_turned_inward_beyond_the_soft_limit() {
 #[test]
 fn every_fault_latches_with_its_name_and_only_a_person_arms_again() {
     type Break = fn(&mut Bench);
-    let breaks: [(&str, Break); 11] = [
+    let breaks: [(&str, Break); 14] = [
         ("no finite number: a fault of this program", |b| {
             b.step(f64::NAN);
         }),
@@ -105,6 +105,7 @@ fn every_fault_latches_with_its_name_and_only_a_person_arms_again() {
         ("beyond the hard limit", |b| {
             for _ in 0..10 {
                 b.state[0] += 0.02;
+                b.state[2] += 0.01;
                 b.step(0.0);
             }
         }),
@@ -115,6 +116,21 @@ fn every_fault_latches_with_its_name_and_only_a_person_arms_again() {
         ("was reset", |b| {
             let seen = b.warden.latest().copied().unwrap();
             b.warden.observe(Observation { device: Some(Seconds(0.0)), ..seen });
+        }),
+        ("was reset", |b| {
+            let seen = b.warden.latest().copied().unwrap();
+            b.warden.observe(seen);
+        }),
+        ("though it is pushed", |b| {
+            for _ in 0..30 {
+                b.step(4.0);
+            }
+        }),
+        ("though the cart moves", |b| {
+            for k in 0..40 {
+                b.state[0] = 0.01 * f64::from(k % 2);
+                b.step(1.0);
+            }
         }),
         ("stood still", |b| b.warden.pass(Seconds(b.now + 5.0))),
         ("holds the command", |b| {
