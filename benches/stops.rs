@@ -179,19 +179,20 @@ mod measure {
 
     fn rates(seconds: u32) {
         println!(
-            "\n{seconds} s of driving      states  lost  missed ticks  state to command, µs: p50     p99     max"
+            "\n{seconds:2} s of driving               states  lost  missed ticks   state to command, µs: p50     p99     max"
         );
         for profile in PROFILES {
             for period_ms in [20, 10, 5] {
                 let (rate, told) = (1000 / period_ms, rate(profile, period_ms, seconds));
                 let (timing, status) = (&told["timing"], &told["status"]);
                 let plant = &timing["plant"];
-                let us = |part: &str| plant["latency_us"][part].as_u64().unwrap_or(0);
+                let count = |value: &Value| value.as_u64().unwrap_or(0);
+                let us = |part: &str| count(&plant["latency_us"][part]);
                 println!(
-                    "{profile:18} {rate:3} Hz {:8} {:5} {:13} {:25} {:7} {:7}   {}",
-                    plant["states"],
-                    plant["lost"],
-                    timing["missed"],
+                    "{profile:18} {rate:3} Hz {:8} {:5} {:13} {:28} {:7} {:7}   {}",
+                    count(&plant["states"]),
+                    count(&plant["lost"]),
+                    count(&timing["missed"]),
                     us("p50"),
                     us("p99"),
                     us("max"),

@@ -7,6 +7,7 @@
 mod stand;
 
 use std::fs;
+use std::io::Write as _;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
@@ -96,6 +97,11 @@ fn completes(stand: &Stand) -> PathBuf {
         }
         let output = stand.program(&line).output().unwrap();
         told = text(&output.stderr) + &text(&output.stdout);
+        // A motor that nobody could stop has driven the cart to the end of its track.
+        if told.contains("push the plant back by hand") {
+            let way = if told.contains("position is +") { -10 } else { 10 };
+            writeln!(stand.device.stdin.as_ref().unwrap(), "push {way}").unwrap();
+        }
     }
     assert_eq!(status(&folder), "complete", "{told}");
     folder
@@ -285,7 +291,6 @@ fn a_session_that_is_killed_or_stands_still_has_a_guard_that_stops_the_motor() {
                 assert!(drove.count() <= 1, "{profile} {signal:?}: it drove on");
             }
             assert_stays_off(&driving.stand.trace_since(since));
-            completes(&driving.stand);
             assert_peaceful(&driving.stand.trace());
         }
     }));

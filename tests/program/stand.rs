@@ -54,10 +54,11 @@ impl Line {
 pub struct Stand {
     /// Where sessions and calibrations are.
     pub folder: tempfile::TempDir,
+    /// The emulated device, whose standard input lends it a hand.
+    pub device: Child,
     program: PathBuf,
     profile: &'static str,
     sets: Vec<String>,
-    device: Child,
     trace: Arc<Mutex<Vec<Line>>>,
     reader: Option<JoinHandle<()>>,
 }
@@ -71,7 +72,7 @@ impl Stand {
             .args(["emulate", profile, "--json", "--port-link", "cp0", "--faults", "faults.ron"])
             .args(sets.iter().flat_map(|set| ["--set", set]))
             .current_dir(folder.path())
-            .stdin(Stdio::null())
+            .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
