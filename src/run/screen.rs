@@ -131,6 +131,7 @@ impl Stage {
         let order = Order {
             subject: sidecar.subject.clone(),
             operator: sidecar.operator.clone(),
+            backend: sidecar.backend.clone(),
             logs: folder.ancestors().nth(2).map_or_else(|| "logs".into(), Path::to_owned),
             ..Order::default()
         };
