@@ -204,14 +204,14 @@ impl Driving {
         now
     }
 
-    /// Waits until the motor is off, after a second of the device's own time: it may be off for a
-    /// moment only.
+    /// Waits until the motor is off and its guard has said all, by the device's own time: the motor
+    /// may be off for a moment only.
     fn stops(&self, since: i64) {
         soon("the stop", || {
             let trace = self.stand.trace_since(since);
             let at =
                 |line: Option<&Line>| line.map_or(0.0, |line| line.entry["at_s"].as_f64().unwrap());
-            self.stand.motor() == 0 && at(trace.last()) - at(trace.first()) > 1.0
+            self.stand.motor() == 0 && at(trace.last()) - at(trace.first()) > 2.0
         });
     }
 
