@@ -351,7 +351,9 @@ impl<W: Witness> Cycle<W> {
                 self.tell_waiting(Some(why));
                 return true;
             }
-            Some((why, _)) => {
+            // The countdown is over: a pole that stirs once more is as good a start.
+            Some((_, false)) => {}
+            Some((why, true)) => {
                 self.note("plant_waits", self.stage.moment(), None, why);
                 self.happen(Event::Pause);
             }
