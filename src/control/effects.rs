@@ -351,7 +351,7 @@ impl<W: Witness> Cycle<W> {
                 self.tell_waiting(Some(why));
                 return true;
             }
-            Some((why, _)) => {
+            Some((why, true)) => {
                 self.note("plant_waits", self.stage.moment(), None, why);
                 self.happen(Event::Pause);
             }
@@ -359,7 +359,8 @@ impl<W: Witness> Cycle<W> {
                 self.tell_waiting(Some("raise the pole: it starts once it is upright".to_owned()));
                 return true;
             }
-            None => {}
+            // After the countdown a pole that stirs once more is as good a start.
+            Some((_, false)) | None => {}
         }
         self.tell_waiting(None);
         false

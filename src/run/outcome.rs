@@ -12,7 +12,7 @@ use crate::control::scribe::Scribe;
 use crate::control::witness::Witness as _;
 use crate::learner::Model;
 use crate::profile::Profile;
-use crate::record::sidecar::{Lateness, Served, Timing};
+use crate::record::sidecar::{Lateness, Timing};
 use crate::record::{EpisodeRow, EvaluationRow, Sidecar, Status};
 use crate::report::achieved::{Achieved, Yardstick, yardstick};
 use crate::report::metrics::{self, MainEnd, Phases, RegionEnd};
@@ -90,15 +90,13 @@ impl Results {
     }
 }
 
-/// Evaluates, measures and writes the last files.
-#[expect(clippy::too_many_arguments, reason = "called once, with all that a session leaves behind")]
+/// Evaluates, measures and writes the last files; of the timing the cycle does not know all.
 pub(super) fn conclude(
     profile: &Profile,
     sidecar: Sidecar,
     folder: PathBuf,
     outcome: Outcome<Scribe>,
-    frames: u64,
-    plant: Option<Served>,
+    known: Timing,
     signal: impl Fn() -> Option<i32>,
 ) -> Result<Finished, RunError> {
     let Outcome { finish, cause, interrupted, sharing, episodes, learned, refused, .. } = outcome;
@@ -155,9 +153,7 @@ pub(super) fn conclude(
             missed: outcome.missed,
             lost_rows,
             lateness_us: lateness(&histogram),
-            realtime_priority: false,
-            screen_frames: frames,
-            plant,
+            ..known
         });
     let last = Sidecar {
         status,

@@ -23,7 +23,7 @@ use crate::operator::terminal::Hands;
 use crate::operator::{self, Choice, Via};
 use crate::profile::{Document, Order, Profile};
 use crate::random::draw_seed;
-use crate::record::sidecar::Host;
+use crate::record::sidecar::{Host, Timing};
 use crate::record::{self, Columns, EpisodeRow, Folder, Manner, Recorder, Sidecar, Status, policy};
 use crate::session::machine::Stage;
 use crate::session::plan::Plan;
@@ -324,13 +324,14 @@ impl Session {
         let clock = metronome.as_mut().map_or(clock, |metronome| metronome as &mut dyn Clock);
         let outcome = self.cycle.run(clock);
         // The motor first, then the last files.
-        let served = self.real.map(Real::close);
+        let plant = self.real.map(Real::close);
         let mut sidecar = self.sidecar;
         if let Some(device) = &self.device {
             device.tell(&mut sidecar);
         }
-        let frames = self.frames.load(Ordering::Relaxed);
-        conclude(&self.profile, sidecar, self.folder, outcome, frames, served, signal)
+        let screen_frames = self.frames.load(Ordering::Relaxed);
+        let known = Timing { screen_frames, plant, ..Timing::default() };
+        conclude(&self.profile, sidecar, self.folder, outcome, known, signal)
     }
 }
 
