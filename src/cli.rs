@@ -282,6 +282,9 @@ pub struct Guard {
     /// The bytes that stop the motor, in hexadecimal digits.
     #[arg(long, value_name = "HEX", value_parser = bytes)]
     pub stop: Box<[u8]>,
+    /// The bytes that say so once more.
+    #[arg(long, value_name = "HEX", value_parser = bytes)]
+    pub again: Box<[u8]>,
     /// How long an armed program may be silent, s.
     #[arg(long, value_name = "SECONDS", value_parser = patience)]
     pub patience_s: f64,

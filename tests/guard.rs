@@ -10,7 +10,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use coadapt::backend::emulator::port::{self, Port};
-use coadapt::backend::guard::{Guard, Watch, stop_burst};
+use coadapt::backend::guard::{Guard, Stop, Watch};
 use coadapt::backend::wire::Format;
 use coadapt::clock::{Clock, WallClock};
 use coadapt::signal::Seconds;
@@ -23,6 +23,12 @@ const PATIENCE: Seconds = Seconds(20.0);
 const PATIENT: &str = "10";
 /// What stops the motor here.
 const STOP: [u8; 3] = [0xaa, 0x00, 0x01];
+/// And this once more.
+const AGAIN: [u8; 2] = [0xaa, 0x02];
+
+fn stop() -> Stop {
+    Stop { burst: STOP.to_vec(), again: AGAIN.to_vec() }
+}
 
 fn program() -> &'static Path {
     Path::new(env!("CARGO_BIN_EXE_coadapt"))
@@ -50,7 +56,7 @@ impl Watched {
         let (mut line, its_end) = UnixStream::pair().unwrap();
         let (port, its_port) = pipe().unwrap();
         let process = Command::new(program())
-            .args(["guard", "--stop", "aa0001", "--patience-s", patience_s])
+            .args(["guard", "--stop", "aa0001", "--again", "aa02", "--patience-s", patience_s])
             .stdin(Stdio::from(std::os::fd::OwnedFd::from(its_end)))
             .stdout(its_port)
             .stderr(Stdio::null())
@@ -71,9 +77,12 @@ impl Watched {
 
     /// Waits for a stop.
     fn stops(&mut self) {
-        let mut bytes = STOP.map(|_| 0);
-        self.port.read_exact(&mut bytes).unwrap();
-        assert_eq!(bytes, STOP);
+        let mut heard = Vec::new();
+        while !heard.ends_with(&STOP) {
+            let mut byte = [0];
+            self.port.read_exact(&mut byte).unwrap();
+            heard.extend(byte);
+        }
     }
 
     /// The line ends: how the guard ends, and what else it wrote until then.
@@ -93,8 +102,10 @@ fn a_program_that_is_gone_while_armed_is_followed_by_stops() {
     watched.beat(Watch::Armed);
     let (status, bytes) = watched.end();
     assert!(status.success());
-    assert!(bytes.len() > STOP.len(), "said once only");
-    assert!(bytes.chunks(STOP.len()).all(|stop| stop == STOP), "{bytes:x?}");
+    let (first, more) = bytes.split_at(STOP.len());
+    assert_eq!(first, STOP);
+    assert!(!more.is_empty(), "said once only");
+    assert!(more.chunks(AGAIN.len()).all(|stop| stop == AGAIN), "{bytes:x?}");
 }
 
 #[test]
@@ -169,14 +180,14 @@ fn a_guard_dropped_while_armed_stops_the_device_at_the_port() {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
     let port = rustix::fs::open(device.name(), flags, Mode::empty()).unwrap();
     device.make_raw().unwrap();
-    let stop = stop_burst(Format::Sensorsini31);
+    let stop = Stop::of(Format::Sensorsini31);
     let mut guard = Guard::start_program(program(), &port, &stop, Seconds(10.0)).unwrap();
     soon("the guard", || guard.is_watching());
     guard.beat(Watch::Armed);
     // The guard has a copy of its own.
     drop(port);
     drop(guard);
-    assert!(heard(&device, stop.len()).starts_with(&stop));
+    assert!(heard(&device, stop.burst.len()).starts_with(&stop.burst));
     soon("the port's end", || {
         matches!(device.read(&mut [0; 512], Duration::ZERO).unwrap(), port::Read::Nobody)
     });
@@ -185,7 +196,7 @@ fn a_guard_dropped_while_armed_stops_the_device_at_the_port() {
 #[test]
 fn a_guard_that_is_not_needed_any_more_goes_and_leaves_nothing() {
     let (mut port, its_port) = pipe().unwrap();
-    let mut guard = Guard::start_program(program(), &its_port, &STOP, Seconds(10.0)).unwrap();
+    let mut guard = Guard::start_program(program(), &its_port, &stop(), Seconds(10.0)).unwrap();
     drop(its_port);
     soon("the guard", || guard.is_watching());
     guard.beat(Watch::Armed);
@@ -202,7 +213,7 @@ fn a_guard_that_is_not_needed_any_more_goes_and_leaves_nothing() {
 #[test]
 fn the_program_sees_whether_its_guard_is_there_and_listens_and_never_waits() {
     let (_port, its_port) = pipe().unwrap();
-    let mut guard = Guard::start_program(program(), &its_port, &STOP, Seconds(10.0)).unwrap();
+    let mut guard = Guard::start_program(program(), &its_port, &stop(), Seconds(10.0)).unwrap();
     soon("the guard", || guard.is_watching());
     let process = Pid::from_raw(guard.process().unwrap().cast_signed()).unwrap();
     kill_process(process, Signal::STOP).unwrap();
@@ -225,9 +236,9 @@ fn the_program_sees_whether_its_guard_is_there_and_listens_and_never_waits() {
 fn a_program_that_is_no_guard_never_watches() {
     let (_port, its_port) = pipe().unwrap();
     let nothing = Path::new("/nonexistent");
-    assert!(Guard::start_program(nothing, &its_port, &STOP, Seconds(0.1)).is_err());
+    assert!(Guard::start_program(nothing, &its_port, &stop(), Seconds(0.1)).is_err());
     let mut guard =
-        Guard::start_program(Path::new("/bin/sh"), &its_port, &STOP, Seconds(0.1)).unwrap();
+        Guard::start_program(Path::new("/bin/sh"), &its_port, &stop(), Seconds(0.1)).unwrap();
     guard.beat(Watch::Idle);
     let process = Pid::from_raw(guard.process().unwrap().cast_signed()).unwrap();
     waitpid(Some(process), WaitOptions::empty()).unwrap();
@@ -244,7 +255,7 @@ fn wrong_words_are_refused_and_none_is_shown() {
         ["--stop", "aa00", "--patience-s", "0"],
     ] {
         let mut command = Command::new(program());
-        command.arg("guard").args(words).stdin(Stdio::null());
+        command.arg("guard").args(words).args(["--again", "aa00"]).stdin(Stdio::null());
         assert_eq!(command.output().unwrap().status.code(), Some(2), "{words:?}");
     }
     let help = Command::new(program()).arg("--help").output().unwrap();

@@ -2,8 +2,8 @@
 //!
 //! A board may hold its last command for ever, and a program that is killed, or stopped by
 //! hand, sends no other. So a small second process, the guard, holds the port as well and
-//! listens to this one's heart beat. When that ends while the motor is armed it writes the
-//! stop, again and again for a second:
+//! listens to this one's heart beat. When that ends while the motor is armed it writes a burst
+//! of stops, then one again and again for a second:
 //!
 //! ```text
 //! this program ──── beats: idle, armed, mute ───▶ coadapt guard
@@ -50,13 +50,32 @@ pub enum GuardError {
     NotStarted(io::Error),
 }
 
-/// The bytes that stop a device of this format, whatever it was told before.
-#[must_use]
-pub fn stop_burst(format: Format) -> Vec<u8> {
-    let mut burst = Vec::new();
-    // Every format can say stop, to any device.
-    let _ = format.codec().encode(&Order::Stop, &mut burst);
-    burst
+/// The bytes that stop a device.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stop {
+    /// Those that stop it whatever it was told before, even half a command.
+    pub burst: Vec<u8>,
+    /// Those that say it once more. A program that goes on may say it at the same time, and a
+    /// board's buffer has to hold both.
+    pub again: Vec<u8>,
+}
+
+impl Stop {
+    /// What stops a device of this format.
+    #[must_use]
+    pub fn of(format: Format) -> Self {
+        let bytes = |order| {
+            let mut bytes = Vec::new();
+            // Every format can say these, to any device.
+            let _ = format.codec().encode(&order, &mut bytes);
+            bytes
+        };
+        let again = match format {
+            Format::Sensorsini31 => Order::Command(0),
+            Format::Cobs1 => Order::Stop,
+        };
+        Self { burst: bytes(Order::Stop), again: bytes(again) }
+    }
 }
 
 /// The guard of one port, seen from the program that it guards against.
@@ -81,7 +100,7 @@ impl Guard {
     ///
     /// # Errors
     /// When no process can be started.
-    pub fn start(port: impl AsFd, stop: &[u8], patience: Seconds) -> Result<Self, GuardError> {
+    pub fn start(port: impl AsFd, stop: &Stop, patience: Seconds) -> Result<Self, GuardError> {
         let program = std::env::current_exe().map_err(GuardError::NoProgram)?;
         Self::start_program(&program, port, stop, patience)
     }
@@ -93,7 +112,7 @@ impl Guard {
     pub fn start_program(
         program: &Path,
         port: impl AsFd,
-        stop: &[u8],
+        stop: &Stop,
         patience: Seconds,
     ) -> Result<Self, GuardError> {
         let (process, line) =
@@ -180,7 +199,7 @@ impl Drop for Guard {
 fn spawn(
     program: &Path,
     port: &impl AsFd,
-    stop: &[u8],
+    stop: &Stop,
     patience: Seconds,
 ) -> io::Result<(Child, UnixStream)> {
     let (line, its_end) = UnixStream::pair()?;
@@ -189,7 +208,8 @@ fn spawn(
     // Whatever else this program has opened is closed by the system when the guard starts.
     let process = Command::new(program)
         .arg("guard")
-        .args(["--stop", &hex(stop), "--patience-s", &patience.0.to_string()])
+        .args(["--stop", &hex(&stop.burst), "--again", &hex(&stop.again)])
+        .args(["--patience-s", &patience.0.to_string()])
         .stdin(Stdio::from(OwnedFd::from(its_end)))
         .stdout(Stdio::from(port))
         // It outlives the terminal, and has nothing to say.
@@ -243,15 +263,19 @@ mod tests {
     #[test]
     fn every_format_can_say_stop_several_times() {
         for format in [Format::Sensorsini31, Format::Cobs1] {
-            assert!(stop_burst(format).len() >= 18, "{format:?}");
+            let Stop { burst, again } = Stop::of(format);
+            assert!(burst.len() >= 18 && burst.len() >= again.len(), "{format:?}");
         }
+        // A board whose buffer holds 32 bytes gets both at once.
+        let Stop { burst, again } = Stop::of(Format::Sensorsini31);
+        assert_eq!((burst.len(), again.len()), (24, 8));
         assert_eq!(hex(&[0xaa, 0x05, 0]), "aa0500");
     }
 
     #[test]
     fn a_stop_waits_for_no_device_that_takes_nothing() {
         let (mut heard, port) = io::pipe().unwrap();
-        let stop = stop_burst(Format::Sensorsini31);
+        let stop = Stop::of(Format::Sensorsini31).burst;
         write_stop(&port, &stop).unwrap();
         let mut bytes = vec![0; stop.len()];
         heard.read_exact(&mut bytes).unwrap();

@@ -13,7 +13,7 @@ use signal_hook::consts::{
 };
 
 use super::vigil::{Act, Heard, Vigil, Watch};
-use super::write_stop;
+use super::{Stop, write_stop};
 use crate::clock::{Clock, WallClock};
 use crate::signal::Seconds;
 
@@ -28,7 +28,7 @@ const READY: u8 = b'r';
 ///
 /// # Errors
 /// When the guard would not survive what it guards against.
-pub fn keep_watch(stop: &[u8], patience: Seconds) -> io::Result<()> {
+pub fn keep_watch(stop: &Stop, patience: Seconds) -> io::Result<()> {
     for signal in DEAF_TO {
         signal_hook::flag::register(signal, Arc::new(AtomicBool::new(false)))?;
     }
@@ -53,7 +53,8 @@ pub fn keep_watch(stop: &[u8], patience: Seconds) -> io::Result<()> {
                 clock.wait_until(until);
             }
             // The next one may get through.
-            Act::Stop => drop(write_stop(stdout(), stop)),
+            Act::Stop => drop(write_stop(stdout(), &stop.burst)),
+            Act::StopAgain => drop(write_stop(stdout(), &stop.again)),
             Act::Leave => return Ok(()),
         }
     }

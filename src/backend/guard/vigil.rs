@@ -52,6 +52,8 @@ pub enum Act {
     Wait(Seconds),
     /// Write the stop.
     Stop,
+    /// Write it once more.
+    StopAgain,
     /// Go: nothing is left to do.
     Leave,
 }
@@ -66,6 +68,8 @@ const EVERY: Seconds = Seconds(0.02);
 struct Burst {
     next: Seconds,
     until: Seconds,
+    /// It was written before.
+    is_said: bool,
 }
 
 /// The guard's mind.
@@ -114,7 +118,8 @@ impl Vigil {
         }
         if let Some(burst) = self.burst.as_mut().filter(|burst| now >= burst.next) {
             burst.next = now + EVERY;
-            return Act::Stop;
+            let was_said = std::mem::replace(&mut burst.is_said, true);
+            return if was_said { Act::StopAgain } else { Act::Stop };
         }
         let next = self.burst.map(|burst| burst.next);
         match (self.is_alone, next) {
@@ -132,8 +137,9 @@ impl Vigil {
 
     fn stop_if_armed(&mut self, now: Seconds) {
         if self.watch == Watch::Armed {
-            let next = self.burst.map_or(now, |burst| burst.next);
-            self.burst = Some(Burst { next, until: now + LASTS });
+            let until = now + LASTS;
+            let fresh = Burst { next: now, until, is_said: false };
+            self.burst = Some(self.burst.map_or(fresh, |burst| Burst { until, ..burst }));
         }
     }
 }
@@ -149,13 +155,15 @@ mod tests {
         vigil: Vigil,
         now: Seconds,
         stops: Vec<f64>,
+        /// How many of these were the whole burst.
+        bursts: usize,
         has_left: bool,
     }
 
     impl Night {
         fn new() -> Self {
             let vigil = Vigil::new(Seconds(0.1));
-            Self { vigil, now: Seconds(0.0), stops: Vec::new(), has_left: false }
+            Self { vigil, now: Seconds(0.0), stops: Vec::new(), bursts: 0, has_left: false }
         }
 
         fn hear(&mut self, heard: Heard) {
@@ -168,8 +176,9 @@ mod tests {
             let end = self.now + Seconds(time);
             loop {
                 let until = match self.vigil.act(self.now) {
-                    Act::Stop => {
+                    act @ (Act::Stop | Act::StopAgain) => {
                         self.stops.push(self.now.0);
+                        self.bursts += usize::from(act == Act::Stop);
                         continue;
                     }
                     Act::Leave => {
@@ -223,6 +232,7 @@ mod tests {
         assert!((49..=51).contains(&night.stops.len()), "{}", night.stops.len());
         assert!(night.stops.iter().all(|at| *at <= end + 1.0));
         assert!(night.stops.windows(2).all(|pair| pair[1] - pair[0] < 0.021));
+        assert_eq!(night.bursts, 1, "a board that is spoken to by two has no room for more");
     }
 
     #[test]
@@ -240,6 +250,7 @@ mod tests {
         assert!(night.stops.is_empty(), "{:?}", night.stops);
         night.pass(0.2);
         assert!(!night.stops.is_empty());
+        assert_eq!(night.bursts, 2);
         // Killed while it was stopped.
         night.pass(5.0);
         night.stops.clear();

@@ -26,6 +26,10 @@ use crate::signal::Seconds;
 const BURST: Seconds = Seconds(0.005);
 /// How long homing may take.
 const HOMING: Seconds = Seconds(30.0);
+/// A device that homes is silent, or says that it does, from this time on.
+const HOMING_SHOWS: Seconds = Seconds(0.5);
+/// So many states after it tell that it does not: none of them was under way for so long.
+const NOT_HOMING: u32 = 5;
 /// A stop that the device has not confirmed after so many periods is said to be unconfirmed.
 const CONFIRMED_WITHIN: f64 = 3.0;
 
@@ -49,6 +53,8 @@ pub struct Driver {
     follows: bool,
     is_homed: bool,
     wants_home: bool,
+    /// States that came though the device should home.
+    awake: u32,
     wanted: Option<Wanted>,
     /// A state came that has not been answered with a command.
     owes: bool,
@@ -83,6 +89,7 @@ impl Driver {
             follows: false,
             is_homed: false,
             wants_home: false,
+            awake: 0,
             wanted: None,
             owes: false,
             speed: 0.0,
@@ -270,6 +277,7 @@ impl Driver {
         self.write(&Order::Home);
         self.wants_home = false;
         self.stage = Stage::Homing;
+        self.awake = 0;
         self.since = now;
         self.is_homed = false;
         self.owes = false;
@@ -355,7 +363,19 @@ impl Driver {
                     self.begin_homing(now);
                 }
             }
-            _ => {}
+            Stage::Homing => self.doubt_homing(frame, now),
+            Stage::Closed(_) => {}
+        }
+    }
+
+    /// A device that was asked to home, and whose states go on, never began.
+    fn doubt_homing(&mut self, frame: &StateFrame, now: Seconds) {
+        let is_homing = frame.flags.is_some_and(|flags| flags.has(Flags::HOMING));
+        if !is_homing && now - self.since > HOMING_SHOWS {
+            self.awake += 1;
+        }
+        if self.awake >= NOT_HOMING {
+            self.ready(now);
         }
     }
 
@@ -431,7 +451,9 @@ impl Driver {
             Stage::Opening => self.close(now, &outcome.to_string()),
             Stage::Homing => self.ready(now),
             // Only what arms matters: of anything else the states tell.
-            Stage::Ready if self.warden.standing() == Standing::Armed => self.disarm(now),
+            Stage::Ready if self.warden.standing() == Standing::Armed => {
+                self.latch(Fault::Refused(outcome), now);
+            }
             _ => {}
         }
     }

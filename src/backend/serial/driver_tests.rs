@@ -103,8 +103,82 @@ fn another_firmware_is_refused_by_name() {
     assert!(matches!(silent.stage(), Stage::Closed(why) if why.contains("does not answer")));
 }
 
-/// Faults as they come, for the session `seed`.
-fn random_faults(seed: u64) -> Faults {
+#[test]
+fn an_order_to_home_that_is_lost_is_found_out_and_homing_that_goes_on_is_not_spoken_into() {
+    for format in FORMATS {
+        let mut bench = Bench::new(format, &Faults::default(), 1);
+        bench.go(1.5);
+        bench.driver.home(bench.now).unwrap();
+        while *bench.driver.stage() != Stage::Homing {
+            bench.go(STEP);
+        }
+        assert!(!bench.driver.take_output().is_empty(), "the order, which nobody gets");
+        bench.go(0.4);
+        assert_eq!(*bench.driver.stage(), Stage::Homing, "{format:?}: it may yet begin");
+        bench.go(0.6);
+        assert_eq!(*bench.driver.stage(), Stage::Ready, "{format:?}");
+        assert_eq!(bench.driver.arm(bench.now), Err(NotArmed::NotHomed));
+        bench.driver.home(bench.now).unwrap();
+        bench.go(2.0);
+        assert_eq!(*bench.driver.stage(), Stage::Homing, "{format:?}");
+        bench.go(18.0);
+        assert!(bench.driver.is_homed(), "{format:?}");
+        assert_eq!(bench.device.offences(), [], "{format:?}");
+    }
+}
+
+/// Why an armed and driven device is not armed any more, soon after `what` befell it.
+fn named(format: Format, what: &Broken) -> String {
+    let faults = Faults { events: vec![Timed { at_s: 23.0, what: what.clone() }], ..Faults::default() };
+    let mut bench = Bench::new(format, &faults, 1);
+    bench.home();
+    bench.go(22.5 - bench.now.0);
+    bench.driver.arm(bench.now).unwrap();
+    // To and fro, as a cart that only goes one way comes to its limit.
+    for turn in 0..60 {
+        bench.wish = Some(if turn % 12 < 6 { 0.7 } else { -0.7 });
+        bench.go(0.05);
+        if let Stage::Closed(why) = bench.driver.stage() {
+            return why.clone();
+        }
+        if let Standing::Latched(fault) = bench.driver.standing() {
+            assert!(bench.now.0 >= 23.0, "{format:?} {what:?}: {fault} before it came");
+            return fault.to_string();
+        }
+    }
+    format!("{:?}", bench.driver.standing())
+}
+
+#[test]
+fn every_fault_that_stops_an_armed_device_is_named() {
+    let jump = |sensor| Broken::Jump { sensor, counts: 1800 };
+    let stuck = |sensor| Broken::Stuck { sensor, for_s: 3.0 };
+    for format in FORMATS {
+        for (what, words) in [
+            (Broken::Stall { for_s: 0.3 }, "no state came"),
+            (Broken::Unplug { for_s: 3.0 }, "unplugged"),
+            (jump(Sensor::Position), "position jumped"),
+            (jump(Sensor::Angle), "angle jumped"),
+            (stuck(Sensor::Position), "the cart does not move though"),
+            (stuck(Sensor::Angle), "the angle does not change"),
+        ] {
+            let name = named(format, &what);
+            assert!(name.contains(words), "{format:?} {what:?}: {name}");
+        }
+    }
+    // A board without its stream says nothing any more, and the other one says hello.
+    for (format, words) in
+        [(Format::Sensorsini31, "no state came"), (Format::Cobs1, "the device was reset")]
+    {
+        let name = named(format, &Broken::Reset);
+        assert!(name.contains(words), "{format:?}: {name}");
+    }
+    let pressed = named(Format::Cobs1, &Broken::Estop { for_s: 1.0 });
+    assert!(pressed.contains("its emergency stop is pressed"), "{pressed}");
+}
+
+/// Faults as they come within `time_s`, for the session `seed`.
+fn random_faults(seed: u64, time_s: f64) -> Faults {
     let mut chance = stream(seed, Purpose::Starts, Place::default());
     let mut noise = || {
         let mut rare = |most: f64| {
@@ -133,7 +207,7 @@ fn random_faults(seed: u64) -> Faults {
             5 => Broken::Garbage { bytes: chance.random_range(1..200) },
             _ => Broken::Estop { for_s },
         };
-        events.push(Timed { at_s: chance.random_range(0.0..3.0), what });
+        events.push(Timed { at_s: chance.random_range(0.0..time_s), what });
     }
     Faults {
         to_host,
@@ -146,14 +220,22 @@ fn random_faults(seed: u64) -> Faults {
 
 /// Sessions of random faults: whatever happens, the driver writes nothing that it must not,
 /// and no command beyond the limits is ever on the motor's pins for its doing.
-fn sessions(count: u64) {
+fn sessions(count: u64) -> Reached {
+    let mut reached = Reached::default();
     for seed in 0..count {
         let format = FORMATS[usize::from(seed % 2 == 1)];
-        let mut bench = Bench::new(format, &random_faults(seed), seed);
-        bench.driver.params.homing = false;
+        // Homing takes its time; without it there is more time for all else.
+        let homes = seed % 8 < 2;
+        let step_s = if homes { 0.4 } else { 0.05 };
+        let mut bench = Bench::new(format, &random_faults(seed, 60.0 * step_s), seed);
+        bench.driver.params.homing = homes;
         bench.driver.opened(Seconds(0.0));
         let mut chance = stream(seed, Purpose::EvaluationStarts, Place::default());
+        let mut drove = false;
         for _ in 0..60 {
+            if homes && !bench.driver.is_homed() && chance.random_bool(0.3) {
+                let _ = bench.driver.home(bench.now);
+            }
             if chance.random_bool(0.2) {
                 let _ = bench.driver.arm(bench.now);
             }
@@ -164,23 +246,44 @@ fn sessions(count: u64) {
                 3 => bench.wish = None,
                 _ => bench.wish = Some(chance.random_range(-5.0..5.0)),
             }
-            bench.go(0.05);
+            let was_armed = bench.driver.standing() == Standing::Armed;
+            bench.go(step_s);
+            drove |= bench.device.command() != 0;
+            // Whatever took the motor away says why.
+            if let (true, Standing::Disarmed) = (was_armed, bench.driver.standing()) {
+                let Stage::Closed(why) = bench.driver.stage() else {
+                    panic!("{format:?}, seed {seed}: disarmed without a word")
+                };
+                assert!(!why.is_empty());
+            }
         }
+        reached.homed += u64::from(bench.driver.is_homed() && homes);
+        reached.driven += u64::from(drove);
         bench.wish = None;
         bench.driver.emergency(bench.now);
         let offences = bench.device.offences();
         assert_eq!(offences, [], "{format:?}, seed {seed}");
     }
+    reached
+}
+
+/// How many of the random sessions came how far.
+#[derive(Debug, Default)]
+struct Reached {
+    homed: u64,
+    driven: u64,
 }
 
 #[test]
 fn no_fault_makes_the_driver_write_what_it_must_not() {
-    sessions(60);
+    let reached = sessions(64);
+    assert!(reached.homed > 4 && reached.driven > 10, "{reached:?}");
 }
 
 /// `cargo test --release -- --ignored ten_thousand`: takes minutes.
 #[test]
 #[ignore = "takes minutes; run it after a change of the driver"]
 fn ten_thousand_sessions_of_random_faults() {
-    sessions(10_000);
+    let reached = sessions(10_000);
+    assert!(reached.homed > 1000 && reached.driven > 2000, "{reached:?}");
 }

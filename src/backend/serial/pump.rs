@@ -14,7 +14,7 @@ use super::driver::{NotArmed, Stage, Stopped};
 use super::port::{Bell, Port};
 use super::shelf;
 use super::station::{About, Station, Wish};
-use crate::backend::guard::{self, Guard, Watch, last_resort};
+use crate::backend::guard::{self, Guard, Stop, Watch, last_resort};
 use crate::backend::safety::warden::Standing;
 use crate::clock::{Clock, WallClock};
 use crate::host::Host;
@@ -32,6 +32,8 @@ const SILENCE: Seconds = Seconds(1.0);
 const QUIET: Seconds = Seconds(0.005);
 /// How long a stop may take to be confirmed at the end.
 const FAREWELL: Seconds = Seconds(0.4);
+/// Whoever was silent for this part of the guard's patience may already share the port with it.
+const ALMOST: f64 = 0.9;
 
 /// Where a station's device and its calibration are found.
 #[derive(Clone, Debug)]
@@ -54,36 +56,30 @@ impl Pump {
     /// there; `about` tells of the plant, but for what `place` tells.
     ///
     /// # Errors
-    /// When the calibration that is kept for the device cannot be read, or no thread starts.
+    /// When no thread starts.
     pub fn start(
         params: &Params,
         place: Place,
         about: About,
         clock: WallClock,
     ) -> Result<Self, StartError> {
-        let host = Host::here();
-        let device = match place.address.path(&host) {
-            Ok(path) => place.address.identity(&host, &path),
-            Err(_) => place.address.to_string(),
-        };
-        let found = shelf::load(&place.shelf, &device)?;
-        let about = About { device, found, ..about };
         let period = about.period;
-        let station = Station::new(params, about);
+        let station = Station::new(params, About { device: place.address.to_string(), ..about });
         let desk = Desk::new(station.look(clock.now()));
         let mut server = Server {
-            stop: guard::stop_burst(params.format),
+            stop: Stop::of(params.format),
             baud: params.baud.0,
             // Its own judgement of silence comes first.
             patience: Seconds(guard::PATIENCE.0.max(1.2 * params.safety.stale_periods * period.0)),
             period,
             place,
-            host,
+            host: Host::here(),
             clock,
             desk: desk.clone(),
             station,
             link: None,
             next_search: Seconds(0.0),
+            beat_at: Seconds(0.0),
             seen_at: Seconds(0.0),
             latency_us: Histogram::new_with_max(10_000_000, 3).ok(),
             not_kept: None,
@@ -92,7 +88,7 @@ impl Pump {
         let thread = std::thread::Builder::new()
             .name("coadapt-serial".to_owned())
             .spawn(move || server.serve())
-            .map_err(StartError::Thread)?;
+            .map_err(StartError)?;
         Ok(Self { desk, thread: Some(thread) })
     }
 
@@ -123,16 +119,10 @@ impl Drop for Pump {
     }
 }
 
-/// Why a station is not served.
+/// That a station is not served: the system gives no thread.
 #[derive(Debug, thiserror::Error)]
-pub enum StartError {
-    /// Its calibration is there and cannot be read.
-    #[error(transparent)]
-    Shelf(#[from] shelf::Error),
-    /// The system gives no thread.
-    #[error("no thread for the serial port: {0}")]
-    Thread(std::io::Error),
-}
+#[error("no thread for the serial port ({0}): end other programs, then try again")]
+pub struct StartError(std::io::Error);
 
 /// An open port, and who guards it.
 struct Link {
@@ -176,7 +166,8 @@ struct Server {
     place: Place,
     host: Host,
     baud: u32,
-    stop: Vec<u8>,
+    stop: Stop,
+    /// How long the guard bears silence while the motor is armed.
     patience: Seconds,
     period: Seconds,
     clock: WallClock,
@@ -184,6 +175,8 @@ struct Server {
     station: Station,
     link: Option<Link>,
     next_search: Seconds,
+    /// When the guard was told last that all is well.
+    beat_at: Seconds,
     /// When the state came that is answered next.
     seen_at: Seconds,
     latency_us: Option<Histogram<u64>>,
@@ -220,6 +213,7 @@ impl Server {
         };
         match link.port.read(&mut buffer, patience) {
             Ok(read) => {
+                self.heed_standstill();
                 let states = self.station.driver().received().states;
                 let now = self.clock.now();
                 self.station.read(&buffer[..read], now);
@@ -297,27 +291,28 @@ impl Server {
             return;
         }
         self.next_search = now + SEARCH;
-        let path = match self.place.address.path(&self.host) {
-            Ok(path) => path,
-            Err(missing) => return self.station.lost(missing.to_string()),
-        };
-        match Port::open(&path, self.baud) {
-            Ok((port, bell)) => {
-                let guard = Guard::start(&port, &self.stop, self.patience).ok();
-                if let Ok(copy) = port.as_fd().try_clone_to_owned() {
-                    last_resort::arm(copy, &self.stop);
-                }
-                let device = self.place.address.identity(&self.host, &path);
-                match shelf::load(&self.place.shelf, &device) {
-                    Ok(found) => self.station.meet(device, found),
-                    Err(error) => return self.station.lost(error.to_string()),
-                }
-                self.desk.hang(Some(Box::new(bell)));
-                self.link = Some(Link { port, guard });
-                self.station.opened(self.clock.now());
-            }
-            Err(error) => self.station.lost(error.to_string()),
+        if let Err(why) = self.connect() {
+            self.station.lost(why);
         }
+    }
+
+    /// Opens the device's port, with its guard, or tells why not.
+    fn connect(&mut self) -> Result<(), String> {
+        let told = |error: &dyn std::error::Error| error.to_string();
+        let path = self.place.address.path(&self.host).map_err(|error| told(&error))?;
+        let device = self.place.address.identity(&self.host, &path);
+        let found = shelf::load(&self.place.shelf, &device).map_err(|error| told(&error))?;
+        let (port, bell) = Port::open(&path, self.baud).map_err(|error| told(&error))?;
+        // Nothing fails from here on: what has a copy of the port would keep it locked.
+        let guard = Guard::start(&port, &self.stop, self.patience).ok();
+        if let Ok(copy) = port.as_fd().try_clone_to_owned() {
+            last_resort::arm(copy, &self.stop.burst);
+        }
+        self.station.meet(device, found);
+        self.desk.hang(Some(Box::new(bell)));
+        self.link = Some(Link { port, guard });
+        self.station.opened(self.clock.now());
+        Ok(())
     }
 
     /// The device is gone: its port is closed at once, or it would come back under another name.
@@ -332,6 +327,7 @@ impl Server {
     }
 
     fn flush(&mut self) {
+        self.heed_standstill();
         let output = self.station.take_output();
         let Some(link) = &self.link else { return };
         if *self.station.driver().stage() == Stage::Homing {
@@ -341,6 +337,21 @@ impl Server {
         if let Err(lost) = link.port.write(&output) {
             self.lose(&lost.to_string());
         }
+    }
+
+    /// This thread stood still for so long that the guard has stopped the motor: whatever it was
+    /// about to write is of another time. The guard has the last word and ends first, as a board's
+    /// buffer does not hold the stops of both.
+    fn heed_standstill(&mut self) {
+        let gap = self.clock.now() - self.beat_at;
+        let is_armed = self.station.driver().standing() == Standing::Armed;
+        if !is_armed || gap < self.patience * ALMOST {
+            return;
+        }
+        drop(self.station.take_output());
+        self.tell_guard(Watch::Idle);
+        self.clock.wait_until(self.clock.now() + QUIET);
+        self.station.stood_still(gap, self.clock.now());
     }
 
     /// Somebody has stopped the motor past this thread: it must not drive on.
@@ -359,11 +370,17 @@ impl Server {
             (_, Standing::Armed) => Watch::Armed,
             _ => Watch::Idle,
         };
-        let Some(link) = &mut self.link else { return };
-        link.beat(watch);
-        if watch == Watch::Armed && !link.is_guarded() {
+        self.tell_guard(watch);
+        if watch == Watch::Armed && !self.is_guarded() {
             self.station.unguarded(self.clock.now());
         }
+    }
+
+    fn tell_guard(&mut self, watch: Watch) {
+        if let Some(link) = &mut self.link {
+            link.beat(watch);
+        }
+        self.beat_at = self.clock.now();
     }
 
     fn note_latency(&mut self) {
@@ -395,8 +412,13 @@ impl Server {
         self.desk.show(View { look, latency, not_kept: self.not_kept.clone() });
     }
 
-    /// The motor stops, and is given time to say so.
+    /// The motor stops, and is given time to say so. A device that homes cannot be stopped, and
+    /// whoever spoke to it next would not know that it does: its end is waited for.
     fn say_farewell(&mut self) {
+        while self.link.is_some() && *self.station.driver().stage() == Stage::Homing {
+            self.turn();
+            self.show();
+        }
         let end = self.clock.now() + FAREWELL;
         if self.link.is_some() && *self.station.driver().stage() == Stage::Ready {
             self.station.obey(Wish::Disarm, self.clock.now());

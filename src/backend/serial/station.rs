@@ -248,14 +248,20 @@ impl Station {
         self.refused = Some(why);
     }
 
-    /// The device whose port was just opened is called `device`; `found` is its calibration.
+    /// The device whose port is about to be opened is called `device`; `found` is its calibration.
     pub fn meet(&mut self, device: String, found: Option<Calibration>) {
-        if device == self.about.device {
+        // One that could not be kept counts all the same for the device that it was made at.
+        if device == self.about.device && self.about.found.is_some() {
             return;
         }
         self.about.device = device;
         self.about.found = found;
         self.driver.set_scales(&calibrated(&self.params, self.about.found.as_ref()).scales);
+    }
+
+    /// This program stood still for so long, and the motor's guard has stopped it.
+    pub fn stood_still(&mut self, gap: Seconds, now: Seconds) {
+        self.driver.latch(Fault::Clock(gap.0), now);
     }
 
     /// Nobody would stop the motor any more if this program died.

@@ -1,5 +1,5 @@
 use super::*;
-use crate::backend::guard::stop_burst;
+use crate::backend::guard::Stop;
 
 fn homed() -> Lab {
     let mut lab = Lab::new(Format::Cobs1);
@@ -94,7 +94,7 @@ fn a_guards_stop_stops_it_whatever_was_said_before() {
     let mut command = Vec::new();
     lab.host.encode(&Order::Command(700), &mut command).unwrap();
     lab.write(&command[..5], 0.001);
-    lab.write(&stop_burst(Format::Cobs1), 0.02);
+    lab.write(&Stop::of(Format::Cobs1).burst, 0.02);
     assert_eq!(lab.device.command(), 0);
     assert!(!has(lab.last(), Flags::ARMED) && !has(lab.last(), Flags::WATCHDOG));
 }

@@ -38,7 +38,7 @@ fn a_guards_stop_stops_it_though_a_command_broke_off() {
     let mut command = Vec::new();
     lab.host.encode(&Order::Command(-1500), &mut command).unwrap();
     lab.write(&command[..5], 0.001);
-    lab.write(&crate::backend::guard::stop_burst(Format::Sensorsini31), 0.05);
+    lab.write(&crate::backend::guard::Stop::of(Format::Sensorsini31).burst, 0.05);
     assert_eq!(lab.device.command(), 0);
 }
 

@@ -1,5 +1,7 @@
 //! What stops a real plant.
 
+use crate::backend::wire::Outcome;
+
 /// Why the plant was stopped, and what to do about it.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
@@ -49,12 +51,15 @@ pub enum Fault {
     /// The device started anew.
     #[error("the device was reset: calibrate it again")]
     Reset,
-    /// This computer's clock jumped, as after a sleep.
-    #[error("this computer stood still for {0:.1} s: keep it from sleeping")]
+    /// This computer's clock jumped, as after a sleep, or this program got no time.
+    #[error("this program stood still for {0:.1} s: keep the computer from sleeping and from other work")]
     Clock(f64),
     /// Nobody would stop the motor if this program died.
     #[error("the motor's guard is gone: start coadapt anew")]
     Unguarded,
+    /// The device does not let itself be armed.
+    #[error("the device refused to be armed: {0}")]
+    Refused(Outcome),
     /// The device stopped by itself.
     #[error("the device stopped by itself: {0}")]
     Device(&'static str),
