@@ -3,6 +3,8 @@
 pub mod emulator;
 #[cfg(unix)]
 pub mod guard;
+#[cfg(unix)]
+pub mod priority;
 pub mod safety;
 pub mod serial;
 pub mod simulated;

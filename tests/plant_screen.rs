@@ -47,7 +47,7 @@ fn ready() -> View {
         counts: Counts { good: 3_080, ..Counts::default() },
     };
     let latency = Latency { p50_us: 310, p99_us: 840, max_us: 2_115 };
-    View { look, latency, not_kept: None }
+    View { look, latency, not_kept: None, is_first: true }
 }
 
 fn with(change: impl FnOnce(&mut Look)) -> View {

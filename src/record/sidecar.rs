@@ -47,6 +47,9 @@ pub struct Served {
     pub lost: u64,
     /// From a state until its command was written, µs.
     pub latency_us: Lateness,
+    /// The system let the port's thread go before all others of the computer.
+    #[serde(default)]
+    pub real_time: bool,
 }
 
 /// How well the host kept time.
@@ -168,7 +171,12 @@ mod tests {
         let simulated = Timing { ticks: 7, ..Timing::default() };
         let text = serde_json::to_string(&simulated).unwrap();
         assert!(!text.contains("plant"), "{text}");
-        let plant = Served { states: 9, lost: 1, latency_us: Lateness { p50: 1, p99: 2, max: 3 } };
+        let plant = Served {
+            states: 9,
+            lost: 1,
+            latency_us: Lateness { p50: 1, p99: 2, max: 3 },
+            real_time: true,
+        };
         let real = Timing { plant: Some(plant), ..simulated };
         for timing in [simulated, real] {
             let text = serde_json::to_string(&timing).unwrap();

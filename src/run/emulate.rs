@@ -17,6 +17,8 @@ use crate::backend::emulator::faults::Faults;
 use crate::backend::emulator::port::{Port, Read};
 use crate::backend::emulator::trace::{Entry, Event};
 use crate::backend::emulator::{Emulator, Params};
+#[cfg(unix)]
+use crate::backend::priority;
 use crate::check::{Check, Checker};
 use crate::cli;
 use crate::clock::{Clock, WallClock};
@@ -50,6 +52,9 @@ pub(super) fn emulate(words: &cli::Emulate) -> Result<ExitCode, RunError> {
         notes: Notes { json: words.json, is_read: true },
         lines: hands_on::listen()?,
     };
+    // A real device keeps its time whatever this computer does.
+    #[cfg(unix)]
+    priority::go_first();
     while stand.notes.is_read {
         if let Some(signal) = shutdown.signal() {
             return Ok(signal_code(signal));

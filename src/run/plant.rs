@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::RunError;
 use super::panics::tell_later;
 use super::session::{Company, usage};
 use super::shutdown::Shutdown;
+use super::{RunError, tell};
 use crate::backend::safety::warden::Standing;
 use crate::backend::safety::{Limits, Safe};
 use crate::backend::serial::address::Address;
@@ -24,6 +24,7 @@ use crate::session::plan::Plan;
 use crate::signal::Seconds;
 use crate::tui::app::PlantDesk;
 use crate::tui::plant::Facts;
+use crate::tui::terminal::is_taken;
 
 /// The folder of calibrations, among the sessions: no subject's name begins with a dot.
 const SHELF: &str = ".calibrations";
@@ -249,6 +250,9 @@ impl Real {
     pub(super) fn close(self) -> Served {
         let format = self.params.format;
         let desk = self.pump.desk().clone();
+        if desk.see(|view| view.look.stage == Stage::Homing) && !is_taken() {
+            tell("waiting for the device to end its homing, which nothing can stop: hands off");
+        }
         match self.pump.close() {
             Stopped::Confirmed | Stopped::No => {}
             Stopped::Told | Stopped::Unconfirmed => tell_later(&format!(
@@ -264,7 +268,8 @@ impl Real {
 const fn served(view: &View) -> Served {
     let Latency { p50_us: p50, p99_us: p99, max_us: max } = view.latency;
     let latency_us = Lateness { p50, p99, max };
-    Served { states: view.look.states, lost: view.look.lost, latency_us }
+    let View { look, is_first, .. } = view;
+    Served { states: look.states, lost: look.lost, latency_us, real_time: *is_first }
 }
 
 /// What to do about a motor that nobody can reach.

@@ -262,6 +262,12 @@ impl Page<'_> {
             },
         );
         row("tick", &pace, Role::Text);
+        let (first, role) = if self.view.is_first {
+            ("goes before all else here", Role::Text)
+        } else {
+            ("shares this computer: README", Role::Strong)
+        };
+        row("port", first, role);
     }
 
     /// Whether a hand enables the motor.

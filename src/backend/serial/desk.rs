@@ -27,6 +27,8 @@ pub struct View {
     pub latency: Latency,
     /// A calibration could not be kept, for this reason.
     pub not_kept: Option<String>,
+    /// The port's thread goes before all others of the computer: the system permits it.
+    pub is_first: bool,
 }
 
 /// What somebody wants of the port's thread.
@@ -62,7 +64,7 @@ pub struct Desk(Arc<Shared>);
 
 impl Desk {
     pub(super) fn new(look: Look) -> Self {
-        let view = View { look, latency: Latency::default(), not_kept: None };
+        let view = View { look, latency: Latency::default(), not_kept: None, is_first: false };
         Self(Arc::new(Shared {
             view: Mutex::new(view),
             changed: Condvar::new(),

@@ -129,7 +129,8 @@ fn an_order_to_home_that_is_lost_is_found_out_and_homing_that_goes_on_is_not_spo
 
 /// Why an armed and driven device is not armed any more, soon after `what` befell it.
 fn named(format: Format, what: &Broken) -> String {
-    let faults = Faults { events: vec![Timed { at_s: 23.0, what: what.clone() }], ..Faults::default() };
+    let faults =
+        Faults { events: vec![Timed { at_s: 23.0, what: what.clone() }], ..Faults::default() };
     let mut bench = Bench::new(format, &faults, 1);
     bench.home();
     bench.go(22.5 - bench.now.0);

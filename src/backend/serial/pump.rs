@@ -15,6 +15,7 @@ use super::port::{Bell, Port};
 use super::shelf;
 use super::station::{About, Station, Wish};
 use crate::backend::guard::{self, Guard, Stop, Watch, last_resort};
+use crate::backend::priority;
 use crate::backend::safety::warden::Standing;
 use crate::clock::{Clock, WallClock};
 use crate::host::Host;
@@ -83,6 +84,7 @@ impl Pump {
             seen_at: Seconds(0.0),
             latency_us: Histogram::new_with_max(10_000_000, 3).ok(),
             not_kept: None,
+            is_first: false,
             is_over: false,
         };
         let thread = std::thread::Builder::new()
@@ -181,11 +183,14 @@ struct Server {
     seen_at: Seconds,
     latency_us: Option<Histogram<u64>>,
     not_kept: Option<String>,
+    /// This thread goes before all others of the computer.
+    is_first: bool,
     is_over: bool,
 }
 
 impl Server {
     fn serve(&mut self) {
+        self.is_first = priority::go_first();
         while !self.is_over {
             self.turn();
             self.show();
@@ -409,7 +414,8 @@ impl Server {
             max_us: all.max(),
         });
         let look = self.station.look(self.clock.now());
-        self.desk.show(View { look, latency, not_kept: self.not_kept.clone() });
+        let (not_kept, is_first) = (self.not_kept.clone(), self.is_first);
+        self.desk.show(View { look, latency, not_kept, is_first });
     }
 
     /// The motor stops, and is given time to say so. A device that homes cannot be stopped, and

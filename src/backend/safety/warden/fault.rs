@@ -52,7 +52,9 @@ pub enum Fault {
     #[error("the device was reset: calibrate it again")]
     Reset,
     /// This computer's clock jumped, as after a sleep, or this program got no time.
-    #[error("this program stood still for {0:.1} s: keep the computer from sleeping and from other work")]
+    #[error(
+        "this program stood still for {0:.1} s: keep the computer from sleeping and from other work"
+    )]
     Clock(f64),
     /// Nobody would stop the motor if this program died.
     #[error("the motor's guard is gone: start coadapt anew")]
