@@ -2,8 +2,8 @@
 //! keep up with each other.
 //!
 //! ```sh
-//! cargo bench --bench stops                            # 20 tries each, then 60 s at each rate
-//! cargo bench --bench stops -- --tries 100 --timing 0  # more tries, no rates
+//! cargo bench --bench stops     # 20 tries each, then 60 s at each rate, then 50 sessions of faults
+//! cargo bench --bench stops -- --tries 100 --timing 0 --faults 0    # more tries, nothing else
 //! ```
 //!
 //! The program starts itself once more as the emulated device, as a session at it, and as that
@@ -50,16 +50,25 @@ mod victim {
 
 #[cfg(unix)]
 mod measure {
+    use std::fs::OpenOptions;
     use std::io::Write;
     use std::os::unix::process::CommandExt;
     use std::path::{Path, PathBuf};
-    use std::process::{Child, ExitCode, Stdio};
+    use std::process::{Child, Command, ExitCode, Output, Stdio};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::thread::JoinHandle;
+    use std::time::Duration;
 
+    use coadapt::backend::emulator::faults::{Fault, Faults, Noise, Timed};
+    use coadapt::backend::emulator::port::Port;
+    use coadapt::backend::emulator::rig::Sensor;
     use coadapt::clock::{Clock, WallClock};
     use coadapt::random::{Place, Purpose, stream};
     use coadapt::signal::Seconds;
     use rand::RngExt;
     use rustix::process::{Pid, Signal, kill_process};
+    use rustix::termios::{Winsize, tcsetwinsize};
     use serde_json::Value;
 
     use super::stand::{Line, Stand, monotonic, ready, soon};
@@ -74,9 +83,10 @@ mod measure {
     enum Cause {
         Signal(Signal),
         Panic,
+        ClosedTerminal,
     }
 
-    const CAUSES: [(&str, Cause); 7] = [
+    const CAUSES: [(&str, Cause); 8] = [
         ("SIGINT", Cause::Signal(Signal::INT)),
         ("SIGTERM", Cause::Signal(Signal::TERM)),
         ("SIGHUP", Cause::Signal(Signal::HUP)),
@@ -84,6 +94,7 @@ mod measure {
         ("SIGKILL", Cause::Signal(Signal::KILL)),
         ("SIGSTOP", Cause::Signal(Signal::STOP)),
         ("a panic", Cause::Panic),
+        ("closed", Cause::ClosedTerminal),
     ];
 
     pub(super) fn run(words: &[String]) -> ExitCode {
@@ -92,11 +103,15 @@ mod measure {
             at.map_or(default, |at| words[at + 1].parse().unwrap())
         };
         let (tries, seconds) = (number("--tries", 20), number("--timing", 60));
+        let sessions = number("--faults", 50);
         if tries > 0 {
             stops(tries);
         }
         if seconds > 0 {
             rates(seconds);
+        }
+        if sessions > 0 {
+            faults(sessions);
         }
         ExitCode::SUCCESS
     }
@@ -132,26 +147,34 @@ mod measure {
     fn stop(profile: &'static str, cause: Cause, later: f64) -> Option<f64> {
         let mut sets = ready(profile);
         sets.extend(["session.phases=[main]", "session.main_duration_s=60.0"]);
+        sets.push("backend.hold_to_enable=false");
         let stand = Stand::new(&program(), profile, &sets, "()");
-        let mut command = stand.armed_session();
-        // A job of its own, as a shell starts it: what stops it can let it go on.
-        command.process_group(0).stdin(Stdio::piped());
-        if matches!(cause, Cause::Panic) {
-            command.env(PANICS, "yes");
-        }
-        let mut process = command.spawn().unwrap();
+        let (mut process, mut screen) = match cause {
+            Cause::ClosedTerminal => {
+                let (process, screen) = Screen::at(&stand);
+                screen.begin(&stand);
+                (process, Some(screen))
+            }
+            _ => (alone(&stand, cause), None),
+        };
         let is_driven = stand.is_driven_by(&mut process);
-        WallClock::start().wait_until(Seconds(later));
+        wait(later);
         if is_driven {
             soon("a moment with the motor on", || stand.motor() != 0);
         }
         let began = monotonic();
         let is_there = is_driven && process.try_wait().unwrap().is_none();
         if is_there {
-            happen(cause, &mut process);
+            match cause {
+                Cause::Signal(signal) => {
+                    kill_process(Pid::from_child(&process), signal).unwrap();
+                }
+                Cause::Panic => process.stdin.as_mut().unwrap().write_all(b"!").unwrap(),
+                Cause::ClosedTerminal => drop(screen.take()),
+            }
             soon("the stop", || stand.motor() == 0);
             // Long enough for whatever would start it again.
-            WallClock::start().wait_until(Seconds(0.3));
+            wait(0.3);
         }
         let _ = process.kill();
         process.wait().unwrap();
@@ -160,10 +183,80 @@ mod measure {
         is_there.then(|| stopped_after(began, &trace))
     }
 
-    fn happen(cause: Cause, process: &mut Child) {
-        match cause {
-            Cause::Signal(signal) => kill_process(Pid::from_child(process), signal).unwrap(),
-            Cause::Panic => process.stdin.as_mut().unwrap().write_all(b"!").unwrap(),
+    /// A session that nobody watches.
+    fn alone(stand: &Stand, cause: Cause) -> Child {
+        let mut command = stand.armed_session();
+        // A job of its own, as a shell starts it: what stops it can let it go on.
+        command.process_group(0).stdin(Stdio::piped());
+        if matches!(cause, Cause::Panic) {
+            command.env(PANICS, "yes");
+        }
+        command.spawn().unwrap()
+    }
+
+    /// A terminal with a session on its screen. Dropped, it is closed.
+    struct Screen {
+        terminal: Arc<Port>,
+        reader: Option<JoinHandle<()>>,
+        closes: Arc<AtomicBool>,
+    }
+
+    impl Screen {
+        /// A session at a terminal of its own.
+        fn at(stand: &Stand) -> (Child, Self) {
+            let terminal = Arc::new(Port::open(None).unwrap());
+            let open = || OpenOptions::new().read(true).write(true).open(terminal.name()).unwrap();
+            let size = Winsize { ws_row: 24, ws_col: 80, ws_xpixel: 0, ws_ypixel: 0 };
+            tcsetwinsize(open(), size).unwrap();
+            let process = Command::new("setsid")
+                .args(["--ctty", &program().display().to_string()])
+                .args(stand.words())
+                .args(["--backend", &format!("serial:{}", stand.port())])
+                .current_dir(stand.folder.path())
+                .stdin(open())
+                .stdout(open())
+                .stderr(open())
+                .spawn()
+                .unwrap();
+            let closes = Arc::new(AtomicBool::new(false));
+            let (screen, is_closed) = (Arc::clone(&terminal), Arc::clone(&closes));
+            let reader = std::thread::spawn(move || {
+                while !is_closed.load(Ordering::Relaxed) {
+                    let _ = screen.read(&mut [0; 4096], Duration::from_millis(2));
+                }
+            });
+            (process, Self { terminal, reader: Some(reader), closes })
+        }
+
+        /// The person homes and arms the device, looks at the scene, and begins.
+        fn begin(&self, stand: &Stand) {
+            wait(2.0);
+            if stand.profile == "cobs-cart-pole" {
+                self.press("f");
+                self.press("y");
+                let is_homed = |line: &Line| line.entry["what"] == "homing_ended";
+                soon("the end of homing", || stand.trace().iter().any(is_homed));
+                wait(1.0);
+            }
+            for key in ["m", "o", "\r"] {
+                self.press(key);
+            }
+        }
+
+        fn press(&self, key: &str) {
+            self.terminal.write(key.as_bytes()).unwrap();
+            wait(0.5);
+        }
+    }
+
+    fn wait(time_s: f64) {
+        WallClock::start().wait_until(Seconds(time_s));
+    }
+
+    impl Drop for Screen {
+        fn drop(&mut self) {
+            self.closes.store(true, Ordering::Relaxed);
+            let _ = self.reader.take().map(JoinHandle::join);
         }
     }
 
@@ -183,13 +276,14 @@ mod measure {
         );
         for profile in PROFILES {
             for period_ms in [20, 10, 5] {
-                let (rate, told) = (1000 / period_ms, rate(profile, period_ms, seconds));
+                let rate = 1000 / period_ms;
+                let (told, why) = drive(profile, period_ms, seconds);
                 let (timing, status) = (&told["timing"], &told["status"]);
                 let plant = &timing["plant"];
                 let count = |value: &Value| value.as_u64().unwrap_or(0);
                 let us = |part: &str| count(&plant["latency_us"][part]);
                 println!(
-                    "{profile:18} {rate:3} Hz {:8} {:5} {:13} {:28} {:7} {:7}   {}",
+                    "{profile:18} {rate:3} Hz {:8} {:5} {:13} {:28} {:7} {:7}   {}{}",
                     count(&plant["states"]),
                     count(&plant["lost"]),
                     count(&timing["missed"]),
@@ -197,13 +291,78 @@ mod measure {
                     us("p99"),
                     us("max"),
                     status.as_str().unwrap_or("?"),
+                    if status == "complete" { "" } else { &why },
                 );
             }
         }
     }
 
-    /// The `session.json` of so many seconds of teaching.
-    fn rate(profile: &'static str, period_ms: u32, seconds: u32) -> Value {
+    /// Sessions of random faults: how they ended, and whether the device got what it must not.
+    fn faults(sessions: u32) {
+        println!("\nsessions of random faults");
+        let mut forbidden = 0;
+        for seed in 0..sessions {
+            let mut chance = stream(u64::from(seed), Purpose::Starts, Place::default());
+            let profile = PROFILES[seed as usize % 2];
+            let faults = random_faults(&mut chance);
+            let mut sets = ready(profile);
+            sets.extend(["session.phases=[main]", "session.main_duration_s=6.0"]);
+            let stand = Stand::new(&program(), profile, &sets, &ron(&faults));
+            let output = stand.armed_session().output().unwrap();
+            let trace = stand.end();
+            let bad = trace.iter().filter(|line| {
+                ["forbidden", "crashed"].iter().any(|what| line.entry["what"] == *what)
+            });
+            let bad: Vec<_> = bad.map(|line| line.entry.to_string()).collect();
+            forbidden += bad.len();
+            let code = output.status.code();
+            println!("{seed:3} {profile:18} {code:?} {} {bad:?}", said(&output));
+            assert!(matches!(code, Some(0 | 1)), "{output:?}");
+        }
+        println!("{sessions} sessions, {forbidden} forbidden sends");
+    }
+
+    fn ron(faults: &Faults) -> String {
+        ron::to_string(faults).unwrap()
+    }
+
+    /// Faults as they come.
+    fn random_faults(chance: &mut impl RngExt) -> Faults {
+        let mut noise = || {
+            let mut rare = |most: f64| {
+                if chance.random_bool(0.3) { chance.random_range(0.0..most) } else { 0.0 }
+            };
+            Noise {
+                drop: rare(0.002),
+                duplicate: rare(0.002),
+                flip: rare(0.002),
+                truncate: rare(0.01),
+                delay: rare(0.02),
+                longest_delay_s: 0.03,
+            }
+        };
+        let (to_host, to_device) = (noise(), noise());
+        let mut events = Vec::new();
+        for _ in 0..chance.random_range(0..3) {
+            let for_s = chance.random_range(0.01..0.3);
+            let sensor = if chance.random_bool(0.5) { Sensor::Angle } else { Sensor::Position };
+            let what = match chance.random_range(0..7) {
+                0 => Fault::Stall { for_s },
+                1 => Fault::Reset,
+                2 => Fault::Unplug { for_s },
+                3 => Fault::Stuck { sensor, for_s },
+                4 => Fault::Jump { sensor, counts: chance.random_range(-2000..2000) },
+                5 => Fault::Garbage { bytes: chance.random_range(1..200) },
+                _ => Fault::Estop { for_s },
+            };
+            events.push(Timed { at_s: chance.random_range(0.0..12.0), what });
+        }
+        let garbage_at_connect = chance.random_range(0..50);
+        Faults { to_host, to_device, garbage_at_connect, version: None, events }
+    }
+
+    /// The `session.json` of so many seconds of teaching, and what the session said.
+    fn drive(profile: &'static str, period_ms: u32, seconds: u32) -> (Value, String) {
         let tick = format!("tick_ms={period_ms}.0");
         let duration = format!("session.main_duration_s={seconds}.0");
         let mut sets = ready(profile);
@@ -214,7 +373,17 @@ mod measure {
         let text =
             session.and_then(|folder| std::fs::read_to_string(folder.join("session.json")).ok());
         let Some(text) = text else { panic!("no session: {output:?}") };
-        serde_json::from_str(&text).unwrap()
+        (serde_json::from_str(&text).unwrap(), format!(": {}", said(&output)))
+    }
+
+    /// The line in which a session says how it ended.
+    fn said(output: &Output) -> String {
+        let all = [&output.stdout, &output.stderr].map(|part| String::from_utf8_lossy(part));
+        let mut lines = all.iter().flat_map(|part| part.lines());
+        lines
+            .find(|line| line.contains("ended") || line.contains("coadapt: "))
+            .unwrap_or("complete")
+            .to_owned()
     }
 
     /// The one folder in `folder`.

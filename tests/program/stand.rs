@@ -57,7 +57,8 @@ pub struct Stand {
     /// The emulated device, whose standard input lends it a hand.
     pub device: Child,
     program: PathBuf,
-    profile: &'static str,
+    /// The name of its profile.
+    pub profile: &'static str,
     sets: Vec<String>,
     trace: Arc<Mutex<Vec<Line>>>,
     reader: Option<JoinHandle<()>>,
@@ -138,12 +139,18 @@ impl Stand {
         command
     }
 
-    /// A session with this profile.
+    /// The words of a session with this profile.
+    pub fn words(&self) -> Vec<String> {
+        let mut words = vec!["run".to_owned(), self.profile.to_owned()];
+        words.extend(self.sets.iter().flat_map(|set| ["--set".to_owned(), set.clone()]));
+        words.extend(["--operator", "simulated:expert", "--seed", "1"].map(str::to_owned));
+        words
+    }
+
+    /// A session with this profile, and nobody at a screen.
     pub fn session(&self, more: &str) -> Command {
-        let mut command = self.program(&format!("run {}", self.profile));
-        command.args(self.sets.iter().flat_map(|set| ["--set", set]));
-        command.args(["--headless", "--operator", "simulated:expert", "--seed", "1"]);
-        command.args(more.split_whitespace());
+        let mut command = self.program("");
+        command.args(self.words()).arg("--headless").args(more.split_whitespace());
         command
     }
 

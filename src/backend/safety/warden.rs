@@ -348,9 +348,11 @@ impl Warden {
         let soft = self.params.soft_limit_m;
         let rolls_to = position + velocity * self.params.coast_s;
         let is_beyond = [*position, rolls_to].iter().any(|x| x.abs() > soft && wanted * x > 0.0);
-        // One that still rolls outward beyond it is braked.
-        let is_leaving = position.abs() > soft && velocity * position > 0.0;
-        let brake = if is_leaving { -position.signum() * BRAKE * self.limit } else { 0.0 };
+        // One that still rolls outward there, or on to the hard limit, is braked.
+        let is_far = position.abs() > soft || rolls_to.abs() > self.params.hard_limit_m;
+        let is_leaving = is_far && velocity * position > 0.0;
+        let part = if is_leaving { (velocity.abs() / BRAKED_FULLY).min(1.0) } else { 0.0 };
+        let brake = -position.signum() * part * self.limit;
         let allowed = if is_beyond { 0.0 } else { wanted };
         if allowed.abs() < brake.abs() { brake } else { allowed }
     }
@@ -449,8 +451,9 @@ const PUSHED: f64 = 0.3;
 const STUCK_FOR: Seconds = Seconds(0.5);
 /// A pole hangs no more still than this while its cart moves, m.
 const STUCK_OVER_M: f64 = 0.15;
-/// A cart that rolls on beyond the soft limit is braked by this part of the largest action.
-const BRAKE: f64 = 0.6;
+/// A cart that rolls on beyond the soft limit as fast as this is braked by the largest action, and
+/// a slower one by less, m/s.
+const BRAKED_FULLY: f64 = 0.1;
 /// A pause of the caller that no scheduler explains.
 const CLOCK_JUMP: Seconds = Seconds(1.0);
 

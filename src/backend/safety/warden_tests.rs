@@ -95,6 +95,29 @@ fn an_action_is_saturated_slewed_and_turned_inward_beyond_the_soft_limit() {
 }
 
 #[test]
+fn a_cart_that_rolls_on_beyond_the_soft_limit_or_towards_the_hard_one_is_braked() {
+    // Position and velocity, what is wanted, and what is allowed.
+    for (x, v, wanted, allowed) in [
+        (0.171, 0.05, 4.0, -5.0),
+        (0.171, 0.05, -8.0, -8.0),
+        (0.171, 0.5, -8.0, -10.0),
+        (-0.171, -0.05, 0.0, 5.0),
+        (0.171, -0.05, -3.0, -3.0),
+        (0.171, -0.05, 3.0, 0.0),
+        (0.16, 0.2, 4.0, 0.0),
+        (0.16, 0.3, 4.0, -10.0),
+        (0.16, 0.05, 4.0, 4.0),
+    ] {
+        let mut bench = Bench::new(free());
+        bench.state = [x, v, 0.0, 0.0];
+        bench.frame();
+        bench.warden.arm(Seconds(bench.now)).unwrap();
+        let given = bench.want(wanted);
+        assert!((given - allowed).abs() < 1e-9, "{x} {v} {wanted}: {given}, not {allowed}");
+    }
+}
+
+#[test]
 fn every_fault_latches_with_its_name_and_only_a_person_arms_again() {
     type Break = fn(&mut Bench);
     let breaks: [(&str, Break); 14] = [
