@@ -4,6 +4,7 @@
 //! ```sh
 //! cargo bench --bench stops     # 20 tries each, then 60 s at each rate, then 50 sessions of faults
 //! cargo bench --bench stops -- --tries 100 --timing 0 --faults 0    # more tries, nothing else
+//! cargo bench --bench stops -- --profile cobs-cart-pole             # at one device only
 //! ```
 //!
 //! The program starts itself once more as the emulated device, as a session at it, and as that
@@ -102,16 +103,19 @@ mod measure {
             let at = words.iter().position(|word| word == name);
             at.map_or(default, |at| words[at + 1].parse().unwrap())
         };
+        let only = words.iter().position(|word| word == "--profile").map(|at| &words[at + 1]);
+        let profiles: Vec<_> =
+            PROFILES.into_iter().filter(|name| only.is_none_or(|only| only == name)).collect();
         let (tries, seconds) = (number("--tries", 20), number("--timing", 60));
         let sessions = number("--faults", 50);
         if tries > 0 {
-            stops(tries);
+            stops(&profiles, tries);
         }
         if seconds > 0 {
-            rates(seconds);
+            rates(&profiles, seconds);
         }
         if sessions > 0 {
-            faults(sessions);
+            faults(&profiles, sessions);
         }
         ExitCode::SUCCESS
     }
@@ -121,10 +125,10 @@ mod measure {
         std::env::current_exe().unwrap()
     }
 
-    fn stops(tries: u32) {
+    fn stops(profiles: &[&'static str], tries: u32) {
         println!("motor at 0 after, ms          min  median     max   above {LATE_MS} ms");
         let mut chance = stream(1, Purpose::Starts, Place::default());
-        for profile in PROFILES {
+        for profile in profiles.iter().copied() {
             for (name, cause) in CAUSES {
                 let mut took: Vec<f64> = Vec::new();
                 while took.len() < tries as usize {
@@ -270,11 +274,11 @@ mod measure {
         took
     }
 
-    fn rates(seconds: u32) {
+    fn rates(profiles: &[&'static str], seconds: u32) {
         println!(
             "\n{seconds:2} s of driving               states  lost  missed ticks   state to command, µs: p50     p99     max"
         );
-        for profile in PROFILES {
+        for profile in profiles.iter().copied() {
             for period_ms in [20, 10, 5] {
                 let rate = 1000 / period_ms;
                 let (told, why) = drive(profile, period_ms, seconds);
@@ -298,12 +302,12 @@ mod measure {
     }
 
     /// Sessions of random faults: how they ended, and whether the device got what it must not.
-    fn faults(sessions: u32) {
+    fn faults(profiles: &[&'static str], sessions: u32) {
         println!("\nsessions of random faults");
         let mut forbidden = 0;
         for seed in 0..sessions {
             let mut chance = stream(u64::from(seed), Purpose::Starts, Place::default());
-            let profile = PROFILES[seed as usize % 2];
+            let profile = profiles[seed as usize % profiles.len()];
             let faults = random_faults(&mut chance);
             let mut sets = ready(profile);
             sets.extend(["session.phases=[main]", "session.main_duration_s=6.0"]);

@@ -369,6 +369,13 @@ fn a_halt_gives_the_terminal_back_and_takes_it_again() {
 }
 
 #[test]
+fn a_terminal_that_takes_nothing_any_more_does_not_hold_up_the_end() {
+    let mut terminal = live(Answers::Plainly);
+    terminal.stalls(|terminal| terminal.signal("TERM"));
+    assert_eq!(terminal.session(FOLDER)["status"], "interrupted");
+}
+
+#[test]
 fn signals_end_the_set_up_too() {
     for (signal, code) in [("TERM", 143), ("HUP", 129), ("INT", 130)] {
         let mut terminal = Seat::default().open("");

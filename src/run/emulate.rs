@@ -18,7 +18,7 @@ use crate::backend::emulator::port::{Port, Read};
 use crate::backend::emulator::trace::{Entry, Event};
 use crate::backend::emulator::{Emulator, Params};
 #[cfg(unix)]
-use crate::backend::priority;
+use crate::backend::priority::{self, Urgency};
 use crate::check::{Check, Checker};
 use crate::cli;
 use crate::clock::{Clock, WallClock};
@@ -29,7 +29,7 @@ use crate::signal::Seconds;
 const TURN: Seconds = Seconds(0.001);
 /// When the machine was busy for longer than this, the device's time stood still: a burst of
 /// states from a past that no host saw would make it look as if the host were to blame.
-const STALL: Seconds = Seconds(0.01);
+const STALL: Seconds = Seconds(0.004);
 
 /// Emulates until a signal comes, or the reader of the trace is gone.
 pub(super) fn emulate(words: &cli::Emulate) -> Result<ExitCode, RunError> {
@@ -54,7 +54,7 @@ pub(super) fn emulate(words: &cli::Emulate) -> Result<ExitCode, RunError> {
     };
     // A real device keeps its time whatever this computer does.
     #[cfg(unix)]
-    priority::go_first();
+    priority::go_first(Urgency::Motor);
     while stand.notes.is_read {
         if let Some(signal) = shutdown.signal() {
             return Ok(signal_code(signal));

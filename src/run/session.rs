@@ -12,6 +12,7 @@ use super::choose::{Hand, assigned_mode, cut_off_notice, order_policy, steer};
 use super::outcome::{Finished, conclude};
 use super::plant::{self, Real};
 use super::shutdown::Shutdown;
+use crate::backend::priority::{self, Urgency};
 use crate::clock::{self, Clock, WallClock};
 use crate::control::cycle::{Crew, Cycle, Rules};
 use crate::control::scribe::{Device, Origin, Scribe, standing_of};
@@ -320,11 +321,15 @@ impl Session {
         clock: &mut dyn Clock,
         signal: impl Fn() -> Option<i32>,
     ) -> Result<Finished, RunError> {
+        if self.real.is_some() {
+            priority::go_first(Urgency::Decision);
+        }
         let mut metronome = self.real.as_ref().map(Real::metronome);
         let clock = metronome.as_mut().map_or(clock, |metronome| metronome as &mut dyn Clock);
         let outcome = self.cycle.run(clock);
         // The motor first, then the last files.
         let plant = self.real.map(Real::close);
+        priority::go_with_all();
         let mut sidecar = self.sidecar;
         if let Some(device) = &self.device {
             device.tell(&mut sidecar);

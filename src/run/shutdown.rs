@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::mpsc::sync_channel;
+use std::time::Duration;
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGTTIN};
 use signal_hook::iterator::Signals;
@@ -15,6 +17,9 @@ use crate::tui::terminal::{give_back, is_taken, take_again};
 
 /// The port's thread has stopped the motor after so long; if not, the guard is about to.
 const LAST_WORD: Seconds = Seconds(0.04);
+
+/// How long a terminal may take to be given back.
+const FAREWELL: Duration = Duration::from_millis(300);
 
 /// Remembers the signal that asked the program to end.
 #[derive(Clone, Debug, Default)]
@@ -73,7 +78,7 @@ impl Shutdown {
     fn hear(&self, signal: i32) {
         if self.signal.swap(signal, Ordering::SeqCst) != 0 {
             // Asked twice: the terminal is given back, and the session can be resumed.
-            give_back();
+            give_back_in_time();
             let _ = emulate_default_handler(signal);
         }
         let session = self.sessions.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -81,6 +86,16 @@ impl Shutdown {
             session.insist(interrupt(signal));
         }
     }
+}
+
+/// Gives the terminal back, unless it takes nothing any more, as over a link that stalls.
+fn give_back_in_time() {
+    let (done, is_done) = sync_channel(1);
+    let _ = std::thread::Builder::new().name("coadapt-farewell".to_owned()).spawn(move || {
+        give_back();
+        let _ = done.send(());
+    });
+    let _ = is_done.recv_timeout(FAREWELL);
 }
 
 /// Stands still until somebody lets the program go on, as after Ctrl-Z. A real plant has

@@ -192,6 +192,25 @@ impl Terminal {
         self.shows_that("WAIT", |screen| screen.contains("motor") && screen.contains(" WAIT "));
     }
 
+    /// Stops reading what the program writes, as a link that stalls, and does `what` every 0.1 s
+    /// until the program has ended.
+    pub fn stalls(&mut self, what: impl Fn(&Self)) {
+        let seen = Arc::clone(&self.seen);
+        let _reader_waits = seen.lock().unwrap();
+        // The system's own buffer fills up with whole pictures.
+        for columns in (0..60).map(|turn| 80 + turn % 2) {
+            self.master.as_ref().unwrap().resize(size(columns, 24)).unwrap();
+            rest(0.05);
+        }
+        let mut clock = WallClock::start();
+        while self.child.try_wait().unwrap().is_none() {
+            let now = clock.now();
+            assert!(now < PATIENCE, "the program never ended");
+            what(self);
+            clock.wait_until(now + Seconds(0.1));
+        }
+    }
+
     pub fn keys(&self, keys: &str) {
         let mut writer = self.writer.lock().unwrap();
         writer.write_all(keys.as_bytes()).unwrap();

@@ -1,6 +1,6 @@
 //! Where a station is looked at and wished from: by the control cycle and by screens.
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 
 use super::driver::Stage;
@@ -118,21 +118,83 @@ impl Desk {
         }
     }
 
+    /// What was asked since. Whoever asks at this very moment rings afterwards.
     pub(super) fn take_asked(&self) -> Vec<Ask> {
-        std::mem::take(&mut *lock(&self.0.asked))
+        unless_busy(&self.0.asked).map(|mut asked| std::mem::take(&mut *asked)).unwrap_or_default()
     }
 
     pub(super) fn hang(&self, bell: Option<Box<dyn Ring>>) {
         *lock(&self.0.bell) = bell;
     }
 
-    pub(super) fn show(&self, view: View) {
-        *lock(&self.0.view) = view;
+    /// Shows `view`, unless somebody looks at this very moment: then it is to be shown soon again.
+    pub(super) fn show(&self, view: View) -> Shown {
+        let Some(mut shown) = unless_busy(&self.0.view) else { return Shown::NotYet };
+        *shown = view;
+        drop(shown);
         self.0.changed.notify_all();
+        Shown::Yes
+    }
+}
+
+/// Whether others see the latest view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shown {
+    /// They do.
+    Yes,
+    /// They still see the one before.
+    NotYet,
+}
+
+/// What is shared, for the port's thread: it waits for nobody. Who holds it may have to wait for
+/// the computer, which is busy with other things, and the motor cannot.
+fn unless_busy<T>(shared: &Mutex<T>) -> Option<MutexGuard<'_, T>> {
+    match shared.try_lock() {
+        Ok(shared) => Some(shared),
+        Err(TryLockError::Poisoned(shared)) => Some(shared.into_inner()),
+        Err(TryLockError::WouldBlock) => None,
     }
 }
 
 /// What was shared outlives a thread that failed.
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::serial::bench::{LIMIT, PERIOD, params};
+    use crate::backend::serial::station::{About, Station};
+    use crate::backend::wire::Format;
+    use crate::plant::cart_pole;
+
+    fn look() -> Look {
+        let about = About {
+            device: "here".to_owned(),
+            period: PERIOD,
+            limit: LIMIT,
+            plant: cart_pole::Params::default(),
+            found: None,
+            now: jiff::Timestamp::UNIX_EPOCH,
+        };
+        Station::new(&params(Format::Cobs1), about).look(Seconds(0.0))
+    }
+
+    #[test]
+    fn the_port_s_thread_waits_for_nobody_who_looks_or_asks() {
+        let desk = Desk::new(look());
+        let fresh = View { is_first: true, ..desk.view() };
+        let shown = desk.see(|_| desk.show(fresh.clone()));
+        assert_eq!(shown, Shown::NotYet);
+        assert!(!desk.view().is_first);
+        assert_eq!(desk.show(fresh), Shown::Yes);
+        assert!(desk.view().is_first);
+
+        desk.wish(Wish::Stop);
+        let asks = lock(&desk.0.asked);
+        assert_eq!(desk.take_asked(), []);
+        drop(asks);
+        assert_eq!(desk.take_asked(), [Ask::Wish(Wish::Stop)]);
+    }
 }

@@ -9,13 +9,13 @@ use hdrhistogram::Histogram;
 
 use super::Params;
 use super::address::Address;
-use super::desk::{Ask, Desk, Latency, Ring, View};
+use super::desk::{Ask, Desk, Latency, Ring, Shown, View};
 use super::driver::{NotArmed, Stage, Stopped};
 use super::port::{Bell, Port};
 use super::shelf;
 use super::station::{About, Station, Wish};
 use crate::backend::guard::{self, Guard, Stop, Watch, last_resort};
-use crate::backend::priority;
+use crate::backend::priority::{self, Urgency};
 use crate::backend::safety::warden::Standing;
 use crate::clock::{Clock, WallClock};
 use crate::host::Host;
@@ -23,6 +23,8 @@ use crate::signal::Seconds;
 
 /// Nobody waits longer than this for bytes: what is due in time is done in time.
 const TURN: Seconds = Seconds(0.01);
+/// Whoever looked at this very moment is shown the news after this time.
+const SOON: Seconds = Seconds(0.001);
 /// A device that is not there is looked for this often.
 const SEARCH: Seconds = Seconds(0.25);
 /// A device that was given up is greeted anew after this time.
@@ -85,6 +87,7 @@ impl Pump {
             latency_us: Histogram::new_with_max(10_000_000, 3).ok(),
             not_kept: None,
             is_first: false,
+            shown: Shown::Yes,
             is_over: false,
         };
         let thread = std::thread::Builder::new()
@@ -185,12 +188,13 @@ struct Server {
     not_kept: Option<String>,
     /// This thread goes before all others of the computer.
     is_first: bool,
+    shown: Shown,
     is_over: bool,
 }
 
 impl Server {
     fn serve(&mut self) {
-        self.is_first = priority::go_first();
+        self.is_first = priority::go_first(Urgency::Motor);
         while !self.is_over {
             self.turn();
             self.show();
@@ -209,7 +213,9 @@ impl Server {
             self.clock.wait_until(self.clock.now() + TURN);
             return;
         };
-        let patience = if self.station.waits_for_caller() {
+        let patience = if self.shown == Shown::NotYet {
+            SOON
+        } else if self.station.waits_for_caller() {
             // The caller has half a period for its decision.
             let left = self.seen_at + self.period * 0.5 - self.clock.now();
             if left.0 > 0.0 { left } else { Seconds(0.0) }
@@ -415,7 +421,7 @@ impl Server {
         });
         let look = self.station.look(self.clock.now());
         let (not_kept, is_first) = (self.not_kept.clone(), self.is_first);
-        self.desk.show(View { look, latency, not_kept, is_first });
+        self.shown = self.desk.show(View { look, latency, not_kept, is_first });
     }
 
     /// The motor stops, and is given time to say so. A device that homes cannot be stopped, and
