@@ -4,7 +4,7 @@
 //! ```sh
 //! cargo bench --bench stops     # 20 tries each, then 60 s at each rate, then 50 sessions of faults
 //! cargo bench --bench stops -- --tries 100 --timing 0 --faults 0    # more tries, nothing else
-//! cargo bench --bench stops -- --profile cobs-cart-pole             # at one device only
+//! cargo bench --bench stops -- --profile cobs-cart-pole --rate 100  # one device, one rate
 //! ```
 //!
 //! The program starts itself once more as the emulated device, as a session at it, and as that
@@ -112,7 +112,7 @@ mod measure {
             stops(&profiles, tries);
         }
         if seconds > 0 {
-            rates(&profiles, seconds);
+            rates(&profiles, number("--rate", 0), seconds);
         }
         if sessions > 0 {
             faults(&profiles, sessions);
@@ -274,14 +274,16 @@ mod measure {
         took
     }
 
-    fn rates(profiles: &[&'static str], seconds: u32) {
+    fn rates(profiles: &[&'static str], only: u32, seconds: u32) {
         println!(
             "\n{seconds:2} s of driving               states  lost  missed ticks   state to command, µs: p50     p99     max"
         );
         for profile in profiles.iter().copied() {
-            for period_ms in [20, 10, 5] {
-                let rate = 1000 / period_ms;
-                let (told, why) = drive(profile, period_ms, seconds);
+            for rate in [50, 100, 200] {
+                if ![0, rate].contains(&only) {
+                    continue;
+                }
+                let (told, why) = drive(profile, 1000 / rate, seconds);
                 let (timing, status) = (&told["timing"], &told["status"]);
                 let plant = &timing["plant"];
                 let count = |value: &Value| value.as_u64().unwrap_or(0);

@@ -10,6 +10,7 @@ pub mod serial;
 pub mod simulated;
 pub mod wire;
 
+use self::safety::Trip;
 use crate::random::Place;
 use crate::signal::{Action, Seconds, State};
 
@@ -69,8 +70,9 @@ pub trait Backend: Send {
     /// no such switch.
     fn enable(&mut self, _is_held: Option<bool>) {}
 
-    /// The emergency stop: the plant stops at once, and until a person has seen to it.
-    fn stop(&mut self) {
+    /// The plant stops at once, and until a person has seen to it: the emergency stop, or a limit
+    /// that `tripped` outside of its own guard.
+    fn stop(&mut self, _tripped: Option<Trip>) {
         self.halt();
     }
 

@@ -66,11 +66,13 @@ struct Rest {
     lost: Option<Lost>,
 }
 
-/// At which look a plant's state is lost, and the numbers that come instead.
+/// At which look a plant's state is lost, the numbers that come instead, and what the plant's own
+/// guard says of it.
 #[derive(Clone, Copy)]
 struct Lost {
     at_look: u32,
     to: [f64; 4],
+    says: Option<&'static str>,
 }
 
 impl Backend for Rest {
@@ -97,6 +99,11 @@ impl Backend for Rest {
     }
 
     fn go_on(&mut self, _place: Place) {}
+
+    fn fault(&mut self) -> Option<String> {
+        let lost = self.lost.filter(|lost| lost.at_look <= self.looks)?;
+        lost.says.map(str::to_owned)
+    }
 }
 
 /// Pushes to the right, and more so in a repeated rollout; learns how often it was told of it.
@@ -390,7 +397,7 @@ fn samples_that_the_learner_refuses_are_told_once_a_rollout() {
 /// The look within the tick that ends the first rollout: each tick looks before it decides,
 /// while it actuates, and at what came of it.
 const LAST_LOOK: u32 = 3 * (TICKS - 1) + 2;
-const GONE: Lost = Lost { at_look: LAST_LOOK, to: [f64::NAN; 4] };
+const GONE: Lost = Lost { at_look: LAST_LOOK, to: [f64::NAN; 4], says: None };
 
 #[test]
 fn a_trip_at_a_rollouts_end_holds_the_plant_until_a_person_begins_anew() {
@@ -421,6 +428,13 @@ fn a_trip_where_nobody_could_begin_anew_ends_the_session_with_its_cause() {
     assert_eq!(outcome.finish, Finish::Aborted);
     assert_eq!(outcome.cause.as_deref(), Some("the plant's state is not finite"));
     assert_eq!(applied(&diary.take()), [PUSH, PUSH, PUSH, PUSH, PUSH, 0.0]);
+}
+
+#[test]
+fn what_the_plants_own_guard_says_is_the_cause() {
+    let gone = Lost { says: Some("the sensor is unplugged"), ..GONE };
+    let outcome = Session::new(&profile("introduction, main"), false, Some(gone)).finish();
+    assert_eq!(outcome.cause.as_deref(), Some("the sensor is unplugged"));
 }
 
 #[test]
@@ -459,7 +473,7 @@ fn a_plant_stops_before_anything_is_written_about_it() {
 /// learner's norm. Counts are told at the ends of eight whole rollouts.
 #[test]
 fn a_sample_that_the_learner_refuses_is_counted_and_not_learned() {
-    let far = Lost { at_look: 4, to: [f64::MAX, 0.0, 0.0, 0.0] };
+    let far = Lost { at_look: 4, to: [f64::MAX, 0.0, 0.0, 0.0], says: None };
     let outcome = Session::new(&profile("main"), false, Some(far)).finish();
     assert_eq!(outcome.finish, Finish::Complete);
     let Notary { learned, refused, .. } = outcome.witness;

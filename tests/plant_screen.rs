@@ -6,7 +6,7 @@ use coadapt::backend::serial::desk::{Latency, View};
 use coadapt::backend::serial::shelf::Uncalibrated;
 use coadapt::backend::serial::standing::{NotArmed, Stage, Stopped};
 use coadapt::backend::serial::station::{Calibrating, Duty, Look, Wish};
-use coadapt::backend::wire::{Counts, Format};
+use coadapt::backend::wire::{Counts, Format, Outcome};
 use coadapt::signal::{Seconds, State};
 use coadapt::tui::keys::Action;
 use coadapt::tui::palette::{Glyphs, Look as Seen, Palette};
@@ -204,7 +204,11 @@ fn a_calibration_asks_measures_and_fails() {
 #[test]
 fn homing_is_asked_for_and_cannot_be_stopped() {
     let view = with(|look| look.is_homed = false);
-    insta::assert_snapshot!("plant_not_homed_80x24", picture(&view));
+    let not_homed = picture(&view);
+    assert!(not_homed.contains("[HOME]") && !not_homed.contains("CALIBRATE"), "{not_homed}");
+    insta::assert_snapshot!("plant_not_homed_80x24", not_homed);
+    let needless = drawn(&view, |shown| shown.facts.homing = false);
+    assert!(needless.contains("calibrated ✓ → [ARM]"), "{needless}");
     let mut panel = Panel::default();
     assert_eq!(panel.key(Action::Home, &view.look), []);
     let asked = drawn(&view, |shown| shown.panel = panel);
@@ -244,6 +248,24 @@ fn what_is_wrong_besides_is_told() {
     assert!(picture.contains("Refused: the motor's guard is not there"), "{picture}");
     assert!(picture.contains("could not be kept: cannot write /nowhere"), "{picture}");
     assert!(picture.contains("NOT KEPT"), "{picture}");
+}
+
+#[test]
+fn why_arming_was_refused_is_told_beside_a_stop_and_once() {
+    let mut view = latched(Fault::Stale(61.0));
+    view.look.refused = Some(NotArmed::Fault(Fault::Stale(61.0)));
+    for stopped in [Stopped::Confirmed, Stopped::Unconfirmed] {
+        view.look.stopped = stopped;
+        let twice = picture(&view);
+        assert!(!twice.contains("Refused"), "{twice}");
+    }
+    view.look.standing = Standing::Disarmed;
+    for refused in [NotArmed::Moving, NotArmed::Device(Outcome::Estop)] {
+        view.look.refused = Some(refused);
+        let picture = picture(&view);
+        assert!(picture.contains(&format!("Refused: {refused}")), "{picture}");
+        assert!(picture.contains("STOP NOT CONFIRMED"), "{picture}");
+    }
 }
 
 #[test]

@@ -307,7 +307,7 @@ fn the_countdown() {
 
 #[test]
 fn a_real_plants_motor_and_what_its_countdown_waits_for() {
-    let motor = |words: &str, role| Some(Badge { words: words.to_owned(), role });
+    let motor = |words: &str, role| Some(Badge { words: words.to_owned(), role, is_armed: true });
     let mut ui = Ui { motor: motor("motor ARMED, hand on", Role::Go), ..Ui::default() };
     small("motor_armed", &info(), &running(Phase::Main), &ui);
     ui.motor = motor("motor ARMED: hold L1", Role::Strong);
@@ -355,6 +355,21 @@ fn paused_stopped_finished() {
     small("stopped", &info(), &snapshot, &Ui::default());
     snapshot.stage = Stage::Finished(Finish::Complete);
     small("finished", &info(), &snapshot, &Ui::default());
+}
+
+#[test]
+fn a_real_plant_that_was_stopped_says_what_goes_on() {
+    let mut snapshot = running(Phase::Main);
+    snapshot.stage = Stage::Stopped(moment(Phase::Main));
+    let words = "motor STOPPED: o tells why".to_owned();
+    let mut badge = Badge { words, role: Role::Alarm, is_armed: false };
+    let ui = Ui { motor: Some(badge.clone()), ..Ui::default() };
+    small("stopped_motor", &info(), &snapshot, &ui);
+    badge.is_armed = true;
+    let ui = Ui { motor: Some(badge), ..Ui::default() };
+    let armed = picture(80, 24, &info(), &snapshot, &ui).to_string();
+    assert!(armed.contains("The motor is armed again."), "{armed}");
+    assert!(!armed.contains("arms the motor"), "{armed}");
 }
 
 #[test]

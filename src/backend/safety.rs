@@ -75,6 +75,12 @@ impl Safe {
     pub const fn tripped(&self) -> Option<Trip> {
         self.tripped
     }
+
+    /// Why the plant is stopped, in words: what its own guard says, who knows more and was first,
+    /// or the limit that tripped.
+    pub fn cause(&mut self) -> Option<String> {
+        self.inner.fault().or_else(|| self.tripped.map(|trip| trip.to_string()))
+    }
 }
 
 impl Backend for Safe {
@@ -122,8 +128,8 @@ impl Backend for Safe {
         self.inner.enable(is_held);
     }
 
-    fn stop(&mut self) {
-        self.inner.stop();
+    fn stop(&mut self, tripped: Option<Trip>) {
+        self.inner.stop(tripped.or(self.tripped));
     }
 
     fn fault(&mut self) -> Option<String> {

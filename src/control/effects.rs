@@ -22,7 +22,7 @@ impl<W: Witness> Cycle<W> {
         self.stage = stage;
         // The plant stops before anything that could wait for a disk.
         if event == Event::Stop {
-            self.crew.backend.stop();
+            self.crew.backend.stop(None);
         } else if effects.contains(&Effect::Halt) {
             self.crew.backend.halt();
         }
@@ -379,8 +379,7 @@ impl<W: Witness> Cycle<W> {
         if !is_under_way {
             return;
         }
-        let tripped = self.crew.backend.tripped().map(|trip| trip.to_string());
-        if let Some(why) = tripped.or_else(|| self.crew.backend.fault()) {
+        if let Some(why) = self.crew.backend.cause() {
             self.note("tripped", self.stage.moment(), None, why.clone());
             self.happen(Event::Stop);
             if !self.rules.plan.attended {

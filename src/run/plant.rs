@@ -124,6 +124,7 @@ impl Real {
         let manner = Manner {
             limit,
             period: tick,
+            stale: tick * params.safety.stale_periods,
             push: params.push,
             push_time: Seconds(params.push_s),
             upright: params.upright_deg.to_radians(),
@@ -185,9 +186,11 @@ impl Real {
             if let Some(signal) = shutdown.signal() {
                 return Err(RunError::Signal(signal));
             }
-            if self.clock.now() >= end {
-                let look = desk.view().look;
-                let refused = look.refused.filter(|_| wish.is_some()).map(|why| why.to_string());
+            let look = desk.view().look;
+            // Where nothing is wished again, a refusal is the last word.
+            let is_refused = wish.is_none() && look.refused.is_some();
+            if is_refused || self.clock.now() >= end {
+                let refused = look.refused.map(|why| why.to_string());
                 return Err(self.failed(&match look.stage {
                     Stage::Closed(why) => why,
                     _ => refused.unwrap_or_else(|| otherwise.to_owned()),
@@ -208,9 +211,9 @@ impl Real {
 
     /// The plant for the control cycle, within its limits.
     pub(super) fn backend(&self) -> Safe {
-        let Manner { limit, period, .. } = self.manner;
+        let Manner { limit, stale, .. } = self.manner;
         // The plant's own guard, which knows more, is to be heard first.
-        let stale = period * (2.0 * self.params.safety.stale_periods);
+        let stale = stale * 2.0;
         let wired = Wired::new(self.pump.desk().clone(), self.clock, self.manner.clone());
         Safe::new(Box::new(wired), Limits { action: limit, stale })
     }

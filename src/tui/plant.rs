@@ -85,6 +85,8 @@ pub struct Badge {
     pub words: String,
     /// How they look.
     pub role: Role,
+    /// Whether the motor may follow.
+    pub is_armed: bool,
 }
 
 impl Badge {
@@ -104,7 +106,7 @@ impl Badge {
             (Standing::Armed, Some(_)) => ("motor ARMED, hand on".to_owned(), Role::Go),
             (Standing::Armed, None) => ("motor ARMED".to_owned(), Role::Go),
         };
-        Self { words, role }
+        Self { words, role, is_armed: look.standing == Standing::Armed }
     }
 }
 

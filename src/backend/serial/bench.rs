@@ -1,12 +1,15 @@
 //! A driver and an emulated device, on virtual time.
 
 use super::Params;
+use super::desk::{Latency, View};
 use super::driver::{Driver, Stage};
 use super::scales;
+use super::station::{About, Station};
 use crate::backend::emulator::faults::Faults;
 use crate::backend::emulator::{self, Emulator};
 use crate::backend::safety::warden::Wanted;
 use crate::backend::wire::Format;
+use crate::plant::cart_pole;
 use crate::signal::Seconds;
 
 /// Both formats.
@@ -23,6 +26,25 @@ pub(super) fn params(format: Format) -> Params {
     let angle = scales::Angle { invert: true, ..scales::Angle::default() };
     let scales = scales::Params { angle, ..scales::Params::default() };
     Params { format, scales, ..Params::default() }
+}
+
+/// What is known of a plant whose device is not there yet.
+pub(super) fn view() -> View {
+    let station = Station::new(&params(Format::Cobs1), about());
+    let look = station.look(Seconds(0.0));
+    View { look, latency: Latency::default(), not_kept: None, is_first: false }
+}
+
+/// The emulated robot, which nobody has calibrated.
+pub(super) fn about() -> About {
+    About {
+        device: "usb-robot".to_owned(),
+        period: PERIOD,
+        limit: LIMIT,
+        plant: cart_pole::Params::default(),
+        found: None,
+        now: "2026-03-14T09:26:53Z".parse().unwrap(),
+    }
 }
 
 /// A driver and a device, on virtual time.

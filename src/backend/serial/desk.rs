@@ -164,26 +164,11 @@ fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::serial::bench::{LIMIT, PERIOD, params};
-    use crate::backend::serial::station::{About, Station};
-    use crate::backend::wire::Format;
-    use crate::plant::cart_pole;
-
-    fn look() -> Look {
-        let about = About {
-            device: "here".to_owned(),
-            period: PERIOD,
-            limit: LIMIT,
-            plant: cart_pole::Params::default(),
-            found: None,
-            now: jiff::Timestamp::UNIX_EPOCH,
-        };
-        Station::new(&params(Format::Cobs1), about).look(Seconds(0.0))
-    }
+    use crate::backend::serial::bench::view;
 
     #[test]
     fn the_port_s_thread_waits_for_nobody_who_looks_or_asks() {
-        let desk = Desk::new(look());
+        let desk = Desk::new(view().look);
         let fresh = View { is_first: true, ..desk.view() };
         let shown = desk.see(|_| desk.show(fresh.clone()));
         assert_eq!(shown, Shown::NotYet);

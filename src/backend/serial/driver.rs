@@ -12,6 +12,7 @@
 //! ```
 
 mod facts;
+mod refusal;
 
 use super::Params;
 use super::greeting::{Greeting, Progress};
@@ -53,6 +54,8 @@ pub struct Driver {
     follows: bool,
     is_homed: bool,
     wants_home: bool,
+    /// What the device answered to the last order to home, if it refused.
+    refused: Option<Outcome>,
     /// States that came though the device should home.
     awake: u32,
     wanted: Option<Wanted>,
@@ -89,6 +92,7 @@ impl Driver {
             follows: false,
             is_homed: false,
             wants_home: false,
+            refused: None,
             awake: 0,
             wanted: None,
             owes: false,
@@ -220,6 +224,7 @@ impl Driver {
         self.warden.arm(now)?;
         self.wanted = None;
         self.wants_home = false;
+        self.refused = None;
         self.follows = false;
         self.stopped = Stopped::No;
         self.stopping = None;
@@ -276,6 +281,7 @@ impl Driver {
     fn begin_homing(&mut self, now: Seconds) {
         self.write(&Order::Home);
         self.wants_home = false;
+        self.refused = None;
         self.stage = Stage::Homing;
         self.awake = 0;
         self.since = now;
@@ -443,18 +449,6 @@ impl Driver {
             self.out.clear();
             self.write(&Order::Stop);
             self.burst = Some(now);
-        }
-    }
-
-    fn refuse(&mut self, outcome: Outcome, now: Seconds) {
-        match self.stage {
-            Stage::Opening => self.close(now, &outcome.to_string()),
-            Stage::Homing => self.ready(now),
-            // Only what arms matters: of anything else the states tell.
-            Stage::Ready if self.warden.standing() == Standing::Armed => {
-                self.latch(Fault::Refused(outcome), now);
-            }
-            _ => {}
         }
     }
 

@@ -1,6 +1,7 @@
 use super::*;
 use crate::backend::emulator::faults::{Fault as Broken, Faults, Noise, Timed};
 use crate::backend::emulator::rig::Sensor;
+use crate::backend::emulator::{self, Emulator};
 use crate::backend::serial::bench::{Bench, FORMATS, LIMIT, PERIOD, STEP, params};
 use crate::random::{Place, Purpose, stream};
 use rand::RngExt;
@@ -287,4 +288,32 @@ fn no_fault_makes_the_driver_write_what_it_must_not() {
 fn ten_thousand_sessions_of_random_faults() {
     let reached = sessions(10_000);
     assert!(reached.homed > 1000 && reached.driven > 2000, "{reached:?}");
+}
+
+#[test]
+fn a_board_that_demands_homing_says_so_to_a_profile_that_has_none() {
+    let params = Params { homing: false, ..params(Format::Cobs1) };
+    let device = emulator::Params { format: Format::Cobs1, ..emulator::Params::default() };
+    let device = Emulator::new(&device, &Faults::default(), 1);
+    let mut bench = Bench::of(&params, PERIOD, device);
+    bench.go(1.5);
+    bench.driver.arm(bench.now).unwrap();
+    bench.go(0.1);
+    assert_eq!(bench.driver.standing(), Standing::Latched(Fault::DemandsHoming));
+    assert!(Fault::DemandsHoming.to_string().contains("set backend.homing to true"));
+}
+
+#[test]
+fn why_a_board_does_not_home_is_kept_until_it_does() {
+    let events = vec![Timed { at_s: 1.0, what: Broken::Estop { for_s: 2.0 } }];
+    let mut bench = Bench::new(Format::Cobs1, &Faults { events, ..Faults::default() }, 1);
+    bench.go(1.5);
+    bench.driver.home(bench.now).unwrap();
+    bench.go(0.5);
+    assert_eq!(bench.driver.refused(), Some(NotArmed::Device(Outcome::Estop)));
+    assert!(!bench.driver.is_homed());
+    bench.go(1.5);
+    bench.driver.home(bench.now).unwrap();
+    bench.go(0.5);
+    assert_eq!(bench.driver.refused(), None);
 }

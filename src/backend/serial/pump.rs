@@ -16,8 +16,8 @@ use super::shelf;
 use super::station::{About, Station, Wish};
 use crate::backend::guard::{self, Guard, Stop, Watch, last_resort};
 use crate::backend::priority::{self, Urgency};
-use crate::backend::safety::warden::Standing;
-use crate::clock::{Clock, WallClock};
+use crate::backend::safety::warden::{Fault, Standing};
+use crate::clock::{self, Clock, WallClock};
 use crate::host::Host;
 use crate::signal::Seconds;
 
@@ -105,16 +105,14 @@ impl Pump {
 
     /// Stops the motor, closes the port, and tells whether the motor is known to be off.
     pub fn close(mut self) -> Stopped {
-        self.end();
-        self.desk.see(|view| view.look.stopped)
+        if self.end() { self.desk.see(|view| view.look.stopped) } else { Stopped::Unconfirmed }
     }
 
-    fn end(&mut self) {
+    /// Ends the port's thread, and tells whether it came to its end. One that failed has pulled
+    /// the last resort, and heard no answer.
+    fn end(&mut self) -> bool {
         self.desk.ask(Ask::Close);
-        if let Some(thread) = self.thread.take() {
-            // One that failed has pulled the last resort.
-            let _ = thread.join();
-        }
+        self.thread.take().is_none_or(|thread| thread.join().is_ok())
     }
 }
 
@@ -204,6 +202,7 @@ impl Server {
 
     /// One turn: bytes in, decisions, bytes out.
     fn turn(&mut self) {
+        self.station.date(clock::today());
         self.obey();
         if self.link.is_none() {
             self.search();
@@ -369,7 +368,7 @@ impl Server {
     fn heed_last_resort(&mut self) {
         if last_resort::was_pulled() && self.station.driver().standing() == Standing::Armed {
             self.clock.wait_until(self.clock.now() + QUIET);
-            self.station.obey(Wish::Stop, self.clock.now());
+            self.station.obey(Wish::Latch(Fault::Interrupted), self.clock.now());
             self.flush();
         }
     }
@@ -444,5 +443,47 @@ impl Server {
         self.link = None;
         self.desk.hang(None);
         self.show();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::serial::bench::{about, params, view};
+    use crate::backend::serial::shelf::{Calibration, MadeFor};
+    use crate::backend::wire::Format;
+
+    #[test]
+    fn a_stop_of_a_thread_that_failed_is_not_confirmed() {
+        let mut view = view();
+        view.look.stopped = Stopped::Confirmed;
+        let pump = |fails: bool| {
+            let desk = Desk::new(view.look.clone());
+            let thread = std::thread::spawn(move || assert!(!fails, "as it may"));
+            Pump { desk, thread: Some(thread) }
+        };
+        assert_eq!(pump(false).close(), Stopped::Confirmed);
+        assert_eq!(pump(true).close(), Stopped::Unconfirmed);
+    }
+
+    #[test]
+    fn its_station_knows_what_day_it_is() {
+        let params = params(Format::Cobs1);
+        let fresh = Calibration {
+            device: "/dev/nowhere".to_owned(),
+            at: clock::today().to_string(),
+            made_for: MadeFor::of(&params),
+            hanging: 0.0,
+            angle_invert: true,
+            position_invert: false,
+            motor_invert: false,
+        };
+        // The program was started at another time, when it was no calibration of then.
+        let about = About { found: Some(fresh), ..about() };
+        let address = "/dev/nowhere".parse().unwrap();
+        let place = Place { address, shelf: PathBuf::from("/nowhere") };
+        let pump = Pump::start(&params, place, about, WallClock::start()).unwrap();
+        let is_calibrated = |view: &View| view.look.calibrated.is_ok().then_some(());
+        assert!(pump.desk().wait(Seconds(60.0), is_calibrated).is_some());
     }
 }

@@ -2,7 +2,7 @@
 
 use super::shelf::Uncalibrated;
 use crate::backend::safety::warden::Fault;
-use crate::backend::wire::Flags;
+use crate::backend::wire::{Flags, Outcome};
 use crate::signal::Seconds;
 
 /// What is said of homing that takes too long.
@@ -71,6 +71,9 @@ pub enum NotArmed {
     /// Its motor is on.
     #[error("the motor is not off yet")]
     Moving,
+    /// It says no.
+    #[error(transparent)]
+    Device(Outcome),
     /// Its readings mean nothing yet.
     #[error(transparent)]
     Uncalibrated(#[from] Uncalibrated),

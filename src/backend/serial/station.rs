@@ -31,6 +31,8 @@ pub enum Wish {
     Disarm,
     /// The emergency stop.
     Stop,
+    /// The motor must stop for this fault, which others than its own guard have found.
+    Latch(Fault),
     /// The fault was seen.
     Clear,
     /// The device is to look for its ends.
@@ -135,7 +137,7 @@ pub struct About {
     pub plant: cart_pole::Params,
     /// The calibration that was found for the device.
     pub found: Option<Calibration>,
-    /// The date and time now.
+    /// The date and time, until the station is told a later one.
     pub now: Timestamp,
 }
 
@@ -225,7 +227,14 @@ impl Station {
                 self.cancel();
                 self.driver.emergency(now);
             }
-            Wish::Clear => self.driver.clear(),
+            Wish::Latch(fault) => {
+                self.cancel();
+                self.driver.latch(fault, now);
+            }
+            Wish::Clear => {
+                self.refused = None;
+                self.driver.clear();
+            }
             Wish::Home => self.refused = self.driver.home(now).err(),
             Wish::Calibrate => self.calibrate(now),
             Wish::Yes => self.answer_question(true, now),
@@ -241,6 +250,11 @@ impl Station {
                 }
             }
         }
+    }
+
+    /// The date and time are `now`: a program may run for days, and a computer may sleep.
+    pub const fn date(&mut self, now: Timestamp) {
+        self.about.now = now;
     }
 
     /// Whoever asked for something is told why not.
@@ -333,7 +347,7 @@ impl Station {
                 }),
             },
             is_enabled: self.is_enabled(now),
-            refused: self.refused,
+            refused: self.refused.or_else(|| self.driver.refused()),
             latest: self.driver.latest(),
             states: self.driver.received().states,
             answered: self.answered,
@@ -389,6 +403,7 @@ impl Station {
 
     fn calibrate(&mut self, now: Seconds) {
         self.rest();
+        self.refused = None;
         self.driver.disarm(now);
         let about = calibration::About {
             device: self.about.device.clone(),
@@ -458,4 +473,44 @@ fn calibrated(params: &Params, found: Option<&Calibration>) -> Params {
         found.apply(&mut params.scales);
     }
     params
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::serial::bench::{about, params};
+    use crate::backend::serial::shelf::MadeFor;
+    use crate::backend::wire::Format;
+
+    #[test]
+    fn a_calibration_grows_old_while_the_program_runs() {
+        let params = params(Format::Cobs1);
+        let found = Calibration {
+            device: "usb-robot".to_owned(),
+            at: about().now.to_string(),
+            made_for: MadeFor::of(&params),
+            hanging: 0.0,
+            angle_invert: true,
+            position_invert: false,
+            motor_invert: false,
+        };
+        let mut station = Station::new(&params, About { found: Some(found), ..about() });
+        let calibrated = |station: &Station| station.look(Seconds(0.0)).calibrated;
+        station.date("2026-03-21T09:00:00Z".parse().unwrap());
+        assert_eq!(calibrated(&station), Ok(about().now.to_string()));
+        station.date("2026-03-21T10:00:00Z".parse().unwrap());
+        assert_eq!(calibrated(&station), Err(Uncalibrated::Stale));
+    }
+
+    #[test]
+    fn what_was_refused_is_forgotten_once_its_reason_was_seen() {
+        let mut station = Station::new(&params(Format::Cobs1), about());
+        let refused = |station: &Station| station.look(Seconds(0.0)).refused;
+        for seen in [Wish::Clear, Wish::Calibrate] {
+            station.obey(Wish::Arm, Seconds(0.0));
+            assert!(refused(&station).is_some());
+            station.obey(seen, Seconds(0.0));
+            assert_eq!(refused(&station), None, "{seen:?}");
+        }
+    }
 }

@@ -3,10 +3,11 @@
 use std::f64::consts::PI;
 
 use super::centre::Pole;
-use super::desk::{Ask, Desk};
+use super::desk::{Ask, Desk, View};
 use super::driver::Stage;
 use super::station::{Duty, Look, Wish};
-use crate::backend::safety::warden::Standing;
+use crate::backend::safety::Trip;
+use crate::backend::safety::warden::{Fault, Standing};
 use crate::backend::{Backend, Readiness, Sensed};
 use crate::clock::{Clock, WallClock};
 use crate::random::Place;
@@ -19,6 +20,8 @@ pub struct Manner {
     pub limit: f64,
     /// The time between two states.
     pub period: Seconds,
+    /// The plant's own guard stops it when no state came for so long.
+    pub stale: Seconds,
     /// A test begins with this part of the largest action,
     pub push: f64,
     /// for so long.
@@ -67,6 +70,20 @@ impl Wired {
             return None;
         }
         Some(action)
+    }
+
+    /// When this program stood still, its port's thread may go on a little later than the control
+    /// cycle: what it finds is the cause of all that follows, and is waited for.
+    fn await_verdict(&self) {
+        let now = self.clock.now();
+        let is_overdue = |view: &View| {
+            let latest = view.look.latest;
+            view.look.standing == Standing::Armed
+                && latest.is_some_and(|(_, at)| now - at > self.manner.stale)
+        };
+        if self.desk.see(is_overdue) {
+            self.desk.wait(VERDICT, |view| (!is_overdue(view)).then_some(()));
+        }
     }
 }
 
@@ -158,12 +175,21 @@ impl Backend for Wired {
         self.desk.ask(Ask::Enable(is_held == Some(true), self.clock.now()));
     }
 
-    fn stop(&mut self) {
+    fn stop(&mut self, tripped: Option<Trip>) {
         self.push = None;
-        self.desk.wish(Wish::Stop);
+        let age = self.sense().age;
+        self.desk.wish(match tripped {
+            None => Wish::Stop,
+            Some(Trip::Action) => Wish::Latch(Fault::Action),
+            Some(Trip::State) => Wish::Latch(Fault::State),
+            // Of a device that is gone there is nothing to clear once it is back.
+            Some(Trip::Stale) if age.0.is_infinite() => Wish::Disarm,
+            Some(Trip::Stale) => Wish::Latch(Fault::Stale(age.0 * 1e3)),
+        });
     }
 
     fn fault(&mut self) -> Option<String> {
+        self.await_verdict();
         match self.desk.see(|view| view.look.standing) {
             Standing::Latched(fault) => Some(fault.to_string()),
             _ => None,
@@ -175,6 +201,8 @@ impl Backend for Wired {
     }
 }
 
+/// How long a verdict is waited for, while the plant is at rest.
+const VERDICT: Seconds = Seconds(0.5);
 /// What is said where nobody can hold a switch.
 const NO_SWITCH: &str = "this terminal reports no key releases, so that no key can be held to \
     enable the motor: use a gamepad, the mouse, or a terminal such as kitty or foot";
@@ -232,5 +260,71 @@ impl Clock for Metronome {
 
     fn is_wall(&self) -> bool {
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::safety::{Limits, Safe};
+    use crate::backend::serial::bench::{LIMIT, PERIOD, params, view};
+    use crate::backend::wire::Format;
+
+    fn manner() -> Manner {
+        let params = params(Format::Cobs1);
+        Manner {
+            limit: LIMIT,
+            period: PERIOD,
+            stale: PERIOD * 3.0,
+            push: params.push,
+            push_time: Seconds(params.push_s),
+            upright: 0.1,
+            switch: None,
+        }
+    }
+
+    /// A plant that is armed, and whose latest state came `at` that time.
+    fn armed(at: Seconds) -> Desk {
+        let mut view = view();
+        view.look.standing = Standing::Armed;
+        view.look.latest = Some((State::new([0.0, 0.0, PI, 0.0]), at));
+        let desk = Desk::new(view.look.clone());
+        desk.show(view);
+        desk
+    }
+
+    #[test]
+    fn after_a_standstill_the_plants_own_guard_names_the_cause() {
+        let desk = armed(Seconds(-1.0));
+        let wired = Wired::new(desk.clone(), WallClock::start(), manner());
+        let limits = Limits { action: LIMIT, stale: PERIOD * 6.0 };
+        let mut safe = Safe::new(Box::new(wired), limits);
+        safe.actuate(Action(1.0));
+        assert_eq!(safe.tripped(), Some(Trip::Stale));
+        // The port's thread goes on a little later.
+        let cause = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                WallClock::start().wait_until(Seconds(0.02));
+                let mut view = desk.view();
+                view.look.standing = Standing::Latched(Fault::Clock(1.0));
+                desk.show(view);
+            });
+            safe.cause()
+        });
+        assert_eq!(cause, Some(Fault::Clock(1.0).to_string()));
+    }
+
+    #[test]
+    fn a_limit_that_tripped_is_not_called_the_emergency_stop() {
+        let desk = armed(Seconds(0.0));
+        let mut wired = Wired::new(desk.clone(), WallClock::start(), manner());
+        for tripped in [None, Some(Trip::Action), Some(Trip::State)] {
+            wired.stop(tripped);
+        }
+        let latch = |fault| Ask::Wish(Wish::Latch(fault));
+        assert_eq!(
+            desk.take_asked(),
+            [Ask::Wish(Wish::Stop), latch(Fault::Action), latch(Fault::State)]
+        );
     }
 }

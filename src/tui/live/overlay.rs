@@ -15,11 +15,7 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
             ("PAUSED", Role::Strong, &["P or Enter   go on", "x            discard rollout"])
         }
         Stage::Paused(_) => ("PAUSED", Role::Strong, &["P or Enter   go on"]),
-        Stage::Stopped(_) => (
-            "EMERGENCY STOP",
-            Role::Alarm,
-            &["The motor is off.", "Enter   repeat the rollout", "q       end the session"],
-        ),
+        Stage::Stopped(_) => ("EMERGENCY STOP", Role::Alarm, after_a_stop(view)),
         Stage::Finished(Finish::Complete) => {
             ("COMPLETE", Role::Strong, &["All phases are over.", "Saving; results follow."])
         }
@@ -28,6 +24,28 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
         }
         _ => return,
     };
+    draw_box(pen, view, (title, role, lines));
+}
+
+/// What goes on after a stop. A real motor was told to, and is armed anew at its own page.
+fn after_a_stop(view: &View<'_>) -> &'static [&'static str] {
+    match &view.ui.motor {
+        None => &["The motor is off.", "Enter   repeat the rollout", "q       end the session"],
+        Some(motor) if motor.is_armed => {
+            &["The motor is armed again.", "Enter   repeat the rollout", "q       end the session"]
+        }
+        Some(_) => &[
+            "The motor was told to stop.",
+            "o       open the plant's page; there",
+            "x       clears what stopped it, and",
+            "m       arms the motor",
+            "Enter   then repeats the rollout",
+            "q       end the session",
+        ],
+    }
+}
+
+fn draw_box(pen: &mut Pen<'_>, view: &View<'_>, (title, role, lines): (&str, Role, &[&str])) {
     let room = usize::from(pen.width().saturating_sub(8)).min(MEASURE);
     let trouble = view.trouble_words(room);
     let lines: Vec<&str> =

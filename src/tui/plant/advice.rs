@@ -35,6 +35,16 @@ impl Advice {
         self.keys.push((key, word));
         self
     }
+
+    /// Why the last wish was refused, where that is not what all of this is about.
+    fn and_refusal(self, page: &Page<'_>) -> Self {
+        let Some(why) = page.view.look.refused.map(|why| why.to_string()) else { return self };
+        let is_said = |line: &String| line.to_lowercase().contains(&why.to_lowercase());
+        if is_said(&self.first) || self.more.iter().any(is_said) {
+            return self;
+        }
+        self.and(format!("Refused: {why}."))
+    }
 }
 
 /// What to do on `page`: danger first, then what is under way, then the next step.
@@ -71,13 +81,14 @@ pub(super) fn of(page: &Page<'_>) -> Advice {
 /// The motor was told to stop, and nobody knows whether it did.
 fn unconfirmed(page: &Page<'_>) -> Advice {
     let advice = Advice::new(Role::Alarm, "STOP NOT CONFIRMED: switch the motor's supply off.");
-    match (&page.view.look.standing, &page.view.look.stage) {
+    let advice = match (&page.view.look.standing, &page.view.look.stage) {
         (Standing::Latched(fault), _) => {
             advice.and(sentence(&fault.to_string())).key("x", "clear it, once all is well")
         }
-        (_, Stage::Closed(why)) => advice.and(sentence(why)),
+        (_, Stage::Closed(why)) => return advice.and(sentence(why)),
         _ => advice.and("The device was told to stop and does not say that it did."),
-    }
+    };
+    advice.and_refusal(page)
 }
 
 /// The prompt of a calibration, how far it is, and the keys that go on.
@@ -126,12 +137,7 @@ fn disarmed(page: &Page<'_>) -> Advice {
             }
         }
     };
-    let advice = match look.refused {
-        Some(why) if !advice.first.eq_ignore_ascii_case(&sentence(&why.to_string())) => {
-            advice.and(format!("Refused: {why}."))
-        }
-        _ => advice,
-    };
+    let advice = advice.and_refusal(page);
     match &page.view.not_kept {
         Some(why) => advice.and(format!("The calibration could not be kept: {why}.")),
         None => advice,

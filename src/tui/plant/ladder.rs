@@ -8,24 +8,35 @@ use crate::tui::palette::Role;
 use crate::tui::pen::Pen;
 
 /// Each step, to be done and done.
-const STEPS: [(&str, &str); 5] = [
-    ("connect", "connected"),
-    ("greet", "greeted"),
-    ("calibrate", "calibrated"),
-    ("arm", "armed"),
-    ("run", "running"),
-];
+fn steps(page: &Page<'_>) -> [(&'static str, &'static str); 5] {
+    // A calibration holds for days; of its device only homing is missing whenever it starts anew.
+    let third = if needs_calibration(page) || !needs_homing(page) { "calibrate" } else { "home" };
+    [
+        ("connect", "connected"),
+        ("greet", "greeted"),
+        (third, "calibrated"),
+        ("arm", "armed"),
+        ("run", "running"),
+    ]
+}
+
+fn needs_calibration(page: &Page<'_>) -> bool {
+    let look = &page.view.look;
+    look.calibrated.is_err() || matches!(look.duty, Duty::Calibrate(_))
+}
+
+fn needs_homing(page: &Page<'_>) -> bool {
+    let look = &page.view.look;
+    look.stage == Stage::Homing || page.facts.homing && !look.is_homed
+}
 
 /// How many steps are done.
 fn done(page: &Page<'_>) -> usize {
     let look = &page.view.look;
-    let is_homed = look.is_homed || !page.facts.homing;
-    let is_calibrating = matches!(look.duty, Duty::Calibrate(_));
     match (&look.stage, look.standing) {
         (Stage::Closed(_), _) => 0,
         (Stage::Opening, _) => 1,
-        (Stage::Homing, _) => 2,
-        _ if look.calibrated.is_err() || !is_homed || is_calibrating => 2,
+        _ if needs_calibration(page) || needs_homing(page) => 2,
         (_, Standing::Disarmed | Standing::Latched(_)) => 3,
         (_, Standing::Armed) if !page.is_running => 4,
         _ => 5,
@@ -36,7 +47,7 @@ fn done(page: &Page<'_>) -> usize {
 pub(super) fn draw(pen: &mut Pen<'_>, page: &Page<'_>) {
     let done = done(page);
     let mut x = 0;
-    for (index, (todo, past)) in STEPS.into_iter().enumerate() {
+    for (index, (todo, past)) in steps(page).into_iter().enumerate() {
         let (words, role) = match index {
             _ if index < done => (format!("{past} ✓"), Role::Go),
             _ if index == done => (format!("[{}]", todo.to_uppercase()), Role::Strong),

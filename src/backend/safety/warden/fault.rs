@@ -8,6 +8,9 @@ pub enum Fault {
     /// A person asked for it.
     #[error("the emergency stop was pressed")]
     Stopped,
+    /// A signal came, or a part of this program failed.
+    #[error("this program was interrupted or failed, and stopped the motor first")]
+    Interrupted,
     /// The wanted action is no number.
     #[error("the wanted action is no finite number: a fault of this program")]
     Action,
@@ -62,6 +65,9 @@ pub enum Fault {
     /// The device does not let itself be armed.
     #[error("the device refused to be armed: {0}")]
     Refused(Outcome),
+    /// The device has ends to find, though the profile says that it has none.
+    #[error("the device demands homing before it is armed: set backend.homing to true")]
+    DemandsHoming,
     /// The device stopped by itself.
     #[error("the device stopped by itself: {0}")]
     Device(&'static str),
