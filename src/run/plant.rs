@@ -93,7 +93,7 @@ impl Real {
     /// The plant of `profile` at `address`, whose port is opened as soon as it is there.
     ///
     /// # Errors
-    /// When its calibration cannot be read. Without a screen also when it cannot be armed.
+    /// When no thread serves it. Without a screen also when it cannot be armed.
     pub(super) fn open(
         address: Address,
         profile: &Profile,
@@ -144,7 +144,10 @@ impl Real {
             .map_err(|error| RunError::Failed(error.to_string()))?;
         let real = Self { pump, clock, manner, params, port, half_track };
         if let Company::Armed(shutdown) = company {
-            real.arm(shutdown)?;
+            if let Err(error) = real.arm(shutdown) {
+                real.close();
+                return Err(error);
+            }
         }
         Ok(real)
     }
