@@ -403,6 +403,18 @@ fn a_device_that_cannot_be_driven_is_refused_and_never_moves() {
     }));
 }
 
+#[test]
+fn a_board_that_demands_homing_of_a_profile_without_it_is_quoted() {
+    let profile = "cobs-cart-pole";
+    let sets = [&ready(profile)[..], &["backend.homing=false"]].concat();
+    let stand = Stand::new(program(), profile, &sets, "()");
+    let output = stand.armed_session().output().unwrap();
+    let told = text(&output.stderr) + &text(&output.stdout);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("set backend.homing to true"), "{told}");
+    assert!(stand.end().iter().filter_map(Line::motor).all(|command| command == 0));
+}
+
 /// Begins a session.
 type Begin = fn(&Stand) -> Command;
 
