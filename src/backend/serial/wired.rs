@@ -268,6 +268,7 @@ mod tests {
     use super::*;
     use crate::backend::safety::{Limits, Safe};
     use crate::backend::serial::bench::{LIMIT, PERIOD, params, view};
+    use crate::backend::serial::desk::Shown;
     use crate::backend::wire::Format;
 
     fn manner() -> Manner {
@@ -307,7 +308,7 @@ mod tests {
                 WallClock::start().wait_until(Seconds(0.02));
                 let mut view = desk.view();
                 view.look.standing = Standing::Latched(Fault::Clock(1.0));
-                desk.show(view);
+                while desk.show(view.clone()) == Shown::NotYet {}
             });
             safe.cause()
         });
