@@ -72,7 +72,7 @@ mod measure {
     use rustix::termios::{Winsize, tcsetwinsize};
     use serde_json::Value;
 
-    use super::stand::{Line, Stand, monotonic, ready, soon};
+    use super::stand::{Line, Stand, monotonic, offences, ready, soon};
     use super::victim::PANICS;
 
     const PROFILES: [&str; 2] = ["physical-cart-pole", "cobs-cart-pole"];
@@ -316,10 +316,7 @@ mod measure {
             let stand = Stand::new(&program(), profile, &sets, &ron(&faults));
             let output = stand.armed_session().output().unwrap();
             let trace = stand.end();
-            let bad = trace.iter().filter(|line| {
-                ["forbidden", "crashed"].iter().any(|what| line.entry["what"] == *what)
-            });
-            let bad: Vec<_> = bad.map(|line| line.entry.to_string()).collect();
+            let bad: Vec<_> = offences(&trace).iter().map(|line| line.entry.to_string()).collect();
             forbidden += bad.len();
             let code = output.status.code();
             println!("{seed:3} {profile:18} {code:?} {} {bad:?}", said(&output));

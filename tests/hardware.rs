@@ -16,7 +16,7 @@ use coadapt::clock::{Clock, WallClock};
 use coadapt::signal::Seconds;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
-use stand::{Line, Stand, monotonic, ready, soon};
+use stand::{Line, Stand, monotonic, offences, ready, soon};
 
 const PROFILES: [&str; 2] = ["physical-cart-pole", "cobs-cart-pole"];
 
@@ -127,19 +127,7 @@ fn completes(stand: &Stand) -> PathBuf {
 
 /// Nothing that the device must never get, and a motor that is off at the end.
 fn assert_peaceful(trace: &[Line]) {
-    let at = |line: &Line| line.entry["at_s"].as_f64().unwrap();
-    // What was written apart is read at once by an emulator that the computer kept waiting.
-    let was_kept = |index: usize| {
-        let before =
-            trace[..index].iter().rev().take_while(|line| at(line) > at(&trace[index]) - 0.05);
-        before.into_iter().any(|line| line.entry["what"] == "stalled")
-    };
-    let bad = trace.iter().enumerate().find(|(index, line)| {
-        let is_forbidden = line.entry["what"] == "forbidden"
-            && !(line.entry["offence"] == "too_many_bytes" && was_kept(*index));
-        is_forbidden || line.entry["what"] == "crashed"
-    });
-    assert!(bad.is_none(), "{bad:?}");
+    assert!(offences(trace).is_empty(), "{:?}", offences(trace));
     assert_eq!(trace.iter().rev().find_map(Line::motor), Some(0), "the motor's last command");
 }
 

@@ -143,11 +143,11 @@ impl Real {
         let pump = Pump::start(&params, place, about, clock)
             .map_err(|error| RunError::Failed(error.to_string()))?;
         let real = Self { pump, clock, manner, params, port, half_track };
-        if let Company::Armed(shutdown) = company {
-            if let Err(error) = real.arm(shutdown) {
-                real.close();
-                return Err(error);
-            }
+        if let Company::Armed(shutdown) = company
+            && let Err(error) = real.arm(shutdown)
+        {
+            real.close();
+            return Err(error);
         }
         Ok(real)
     }

@@ -205,6 +205,23 @@ impl Drop for Stand {
     }
 }
 
+/// What the device got that it never must, and that it crashed.
+pub fn offences(trace: &[Line]) -> Vec<&Line> {
+    let at = |line: &Line| line.entry["at_s"].as_f64().unwrap();
+    // What was written apart is read at once by an emulator that the computer kept waiting.
+    let was_kept = |index: usize| {
+        let before =
+            trace[..index].iter().rev().take_while(|line| at(line) > at(&trace[index]) - 0.05);
+        before.into_iter().any(|line| line.entry["what"] == "stalled")
+    };
+    let is_offence = |(index, line): &(usize, &Line)| {
+        let what = (&line.entry["what"], &line.entry["offence"]);
+        let is_excused = what.1 == "too_many_bytes" && was_kept(*index);
+        what.0 == "crashed" || what.0 == "forbidden" && !is_excused
+    };
+    trace.iter().enumerate().filter(is_offence).map(|(_, line)| line).collect()
+}
+
 /// Waits until something is so.
 pub fn soon(what: &str, mut is: impl FnMut() -> bool) {
     let mut clock = WallClock::start();
