@@ -35,6 +35,7 @@ fn ready() -> View {
         standing: Standing::Disarmed,
         stopped: Stopped::No,
         is_homed: true,
+        is_stuck: false,
         calibrated: Ok("2026-03-14T09:26:53Z".to_owned()),
         duty: Duty::Rest,
         is_enabled: false,
@@ -240,9 +241,40 @@ fn a_fault_and_a_stop_that_nobody_confirms() {
 }
 
 #[test]
+fn a_cart_that_is_stuck_while_it_homes_is_told_with_what_to_do() {
+    let view = with(|look| {
+        look.stage = Stage::Homing;
+        look.is_stuck = true;
+        look.stopped = Stopped::Confirmed;
+    });
+    let picture = picture(&view);
+    assert!(picture.contains("HOMING DOES NOT END: switch the motor's supply off."), "{picture}");
+    assert!(picture.contains("MOVES by itself"), "{picture}");
+    assert!(!picture.contains("stop confirmed"), "{picture}");
+}
+
+#[test]
+fn the_bar_of_a_calibration_hides_no_key() {
+    let picture = picture(&calibrating(Step::Steady, 0.4, "Hold the pole still."));
+    let line = |words: &str| picture.lines().find(|line| line.contains(words)).unwrap().to_owned();
+    assert!(line("40 %").contains("█████"), "{picture}");
+    assert!(line("arm the motor").contains("end the calibration"), "{picture}");
+    assert!(!line("arm the motor").contains('█'), "{picture}");
+}
+
+#[test]
+fn a_motor_that_nobody_can_reach_is_told_whatever_else_is() {
+    let view = View { look: Look { stopped: Stopped::Unconfirmed, ..gone().look }, ..gone() };
+    let picture = picture(&view);
+    assert!(picture.contains("STOP NOT CONFIRMED: switch the motor's supply off"), "{picture}");
+    assert!(picture.contains("may be ON"), "{picture}");
+}
+
+#[test]
 fn what_is_wrong_besides_is_told() {
     let mut view = ready();
-    view.not_kept = Some("cannot write /nowhere: no such folder".to_owned());
+    view.not_kept =
+        Some("the calibration could not be kept: cannot write /nowhere: no such folder".to_owned());
     view.look.refused = Some(NotArmed::Unguarded);
     let picture = picture(&view);
     assert!(picture.contains("Refused: the motor's guard is not there"), "{picture}");

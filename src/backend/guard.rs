@@ -145,6 +145,12 @@ impl Guard {
         self.is_ready && !self.is_gone && self.listens
     }
 
+    /// Whether it has ended, and will never watch again.
+    #[must_use]
+    pub const fn is_gone(&self) -> bool {
+        self.is_gone
+    }
+
     /// The guard's process.
     #[must_use]
     pub fn process(&self) -> Option<u32> {

@@ -201,6 +201,7 @@ impl Page<'_> {
         }
         if let Some(part) = advice.progress {
             picture::progress(&mut pen.part(1, y, 44, 1), part);
+            y += 1;
         }
         let mut x = 1;
         for (key, word) in advice.keys {
@@ -285,16 +286,20 @@ impl Page<'_> {
     fn motor(&self) -> (String, Role) {
         let look = &self.view.look;
         let (standing, role) = match look.standing {
-            _ if look.stage == Stage::Homing => ("MOVES by itself", Role::Strong),
+            _ if look.stage == Stage::Homing => {
+                return ("MOVES by itself".to_owned(), Role::Strong);
+            }
             Standing::Armed => return ("ARMED".to_owned(), Role::Go),
             Standing::Disarmed => ("off", Role::Text),
             Standing::Latched(_) => ("STOPPED", Role::Wait),
         };
         let (known, role) = match look.stopped {
+            Stopped::Unconfirmed => {
+                return ("may be ON: stop NOT CONFIRMED".to_owned(), Role::Alarm);
+            }
             Stopped::No => ("", role),
             Stopped::Told => (", not confirmed yet", role),
             Stopped::Confirmed => (", stop confirmed", role),
-            Stopped::Unconfirmed => (", stop NOT CONFIRMED", Role::Alarm),
         };
         (format!("{standing}{known}"), role)
     }

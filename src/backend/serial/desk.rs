@@ -25,7 +25,7 @@ pub struct View {
     pub look: Look,
     /// From a state to its command.
     pub latency: Latency,
-    /// A calibration could not be kept, for this reason.
+    /// A calibration could not be kept or read, and why.
     pub not_kept: Option<String>,
     /// The port's thread goes before all others of the computer: the system permits it.
     pub is_first: bool,

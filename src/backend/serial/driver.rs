@@ -17,16 +17,14 @@ mod refusal;
 use super::Params;
 use super::greeting::{Greeting, Progress};
 use super::scales::{self, Tracker};
+use super::standing::stopped_by;
 pub use super::standing::{NotArmed, Received, Stage, Stopped};
-use super::standing::{STUCK, stopped_by};
 use crate::backend::safety::warden::{Fault, Observation, Standing, Wanted, Warden};
 use crate::backend::wire::{Codec, Counts, Flags, Format, Message, Order, Outcome, StateFrame};
 use crate::signal::Seconds;
 
 /// Within this time a burst of stops is enough.
 const BURST: Seconds = Seconds(0.005);
-/// How long homing may take.
-const HOMING: Seconds = Seconds(30.0);
 /// A device that homes is silent, or says that it does, from this time on.
 const HOMING_SHOWS: Seconds = Seconds(0.5);
 /// So many states after it tell that it does not: none of them was under way for so long.
@@ -54,6 +52,10 @@ pub struct Driver {
     follows: bool,
     is_homed: bool,
     wants_home: bool,
+    /// The last command that was written drives the motor, or lets the device do so.
+    drives: bool,
+    /// The motor may be on: no state has said that it is off since it was last driven.
+    may_move: bool,
     /// What the device answered to the last order to home, if it refused.
     refused: Option<Outcome>,
     /// States that came though the device should home.
@@ -92,6 +94,8 @@ impl Driver {
             follows: false,
             is_homed: false,
             wants_home: false,
+            drives: false,
+            may_move: false,
             refused: None,
             awake: 0,
             wanted: None,
@@ -121,6 +125,8 @@ impl Driver {
         self.wanted = None;
         self.greeting = Greeting::begin(&self.params, self.period, now);
         self.since = now;
+        // The first thing that a greeting says is that the motor stops.
+        self.drives = false;
         self.stopped = Stopped::No;
         self.stopping = None;
         self.burst = None;
@@ -128,16 +134,12 @@ impl Driver {
 
     /// The port is gone: nothing more can be written, and nothing holds any more.
     pub fn lost(&mut self, why: impl Into<String>) {
-        let was_armed = self.warden.standing() == Standing::Armed;
         self.stage = Stage::Closed(why.into());
         self.out.clear();
         self.owes = false;
         self.is_homed = false;
         self.warden.forget();
         self.frame = None;
-        if was_armed {
-            self.stopped = Stopped::Unconfirmed;
-        }
     }
 
     /// Takes bytes that were read at `now`.
@@ -165,10 +167,7 @@ impl Driver {
     /// Time goes on to `now`.
     pub fn pass(&mut self, now: Seconds) {
         match self.stage {
-            Stage::Homing if (now - self.since).0 > HOMING.0 => {
-                self.close(now, STUCK);
-            }
-            // Homing is silent.
+            // Homing is silent, and a board that homes takes no byte, however long it takes.
             Stage::Closed(_) | Stage::Homing => return,
             Stage::Opening => self.greet(now),
             Stage::Ready => self.warden.pass(now),
@@ -187,15 +186,15 @@ impl Driver {
     }
 
     /// Writes the one command that the latest state allows, if it was not written yet, and
-    /// returns the action that it stands for.
+    /// returns the action that it stands for. A burst of stops is the answer to all states that
+    /// waited with it.
     pub fn answer(&mut self, now: Seconds) -> Option<f64> {
         if self.stage != Stage::Ready || !std::mem::take(&mut self.owes) {
             return None;
         }
         let action = self.warden.allow(self.wanted, now);
         self.heed(now);
-        if self.stopping.is_some_and(|at| at == now) {
-            // The stop that was just written is this state's command.
+        if self.has_just_stopped(now) {
             return Some(0.0);
         }
         let command = self.params.scales.command(action / self.limit, self.speed);
@@ -204,6 +203,8 @@ impl Driver {
         if is_followed {
             self.write(&Order::Command(command));
             self.warden.sent(command.into());
+            self.drives = command != 0;
+            self.may_move |= self.drives;
         }
         Some(action)
     }
@@ -280,6 +281,7 @@ impl Driver {
     /// would be mixed up by the board.
     fn begin_homing(&mut self, now: Seconds) {
         self.write(&Order::Home);
+        (self.drives, self.may_move) = (true, true);
         self.wants_home = false;
         self.refused = None;
         self.stage = Stage::Homing;
@@ -339,6 +341,9 @@ impl Driver {
             );
             return;
         };
+        if matches!(self.stage, Stage::Opening | Stage::Ready) && frame.command == 0 {
+            self.may_move &= self.drives;
+        }
         match self.stage {
             Stage::Opening => {
                 self.greeting.saw(frame.command == 0 && state.is_finite());
@@ -429,13 +434,15 @@ impl Driver {
     fn stop(&mut self, now: Seconds) {
         // The first thing that a greeting says is that the motor stops; more would only get in
         // its way.
-        // A board that homes takes no byte: it is stopped once it is done.
-        if matches!(self.stage, Stage::Opening | Stage::Homing) {
+        // A board that homes takes no byte: it is stopped once it is done. And one that is gone
+        // gets none.
+        if self.stage != Stage::Ready {
             return;
         }
         self.wants_home = false;
         self.write_stops(now);
         self.warden.sent(0);
+        self.drives = false;
         self.stopping = Some(now);
         self.stopped = Stopped::Told;
         self.owes = false;
@@ -444,12 +451,16 @@ impl Driver {
 
     /// A burst of stops, if one is not the last word already: more would fill the board's buffer.
     fn write_stops(&mut self, now: Seconds) {
-        if self.burst.is_none_or(|at| now - at >= BURST) {
+        if !self.has_just_stopped(now) {
             // Whatever else waits would only come before it.
             self.out.clear();
             self.write(&Order::Stop);
             self.burst = Some(now);
         }
+    }
+
+    fn has_just_stopped(&self, now: Seconds) -> bool {
+        self.burst.is_some_and(|at| now - at < BURST)
     }
 
     fn ready(&mut self, now: Seconds) {

@@ -152,6 +152,95 @@ fn named(format: Format, what: &Broken) -> String {
 }
 
 #[test]
+fn a_host_that_stood_still_writes_one_burst_whoever_else_stops_the_motor() {
+    for stood_s in [0.065, 0.09, 0.12] {
+        let mut bench = Bench::armed(Format::Sensorsini31);
+        bench.wish = Some(0.4);
+        bench.go(0.1);
+        let mut waiting = Vec::new();
+        let woken = bench.now + Seconds(stood_s);
+        while bench.now < woken {
+            bench.now = bench.now + Seconds(STEP);
+            let written = bench.driver.take_output();
+            waiting.extend(bench.device.advance(bench.now, &written));
+        }
+        // As the port's thread does it: the clock goes on between all these.
+        let moment = |k: u32| woken + Seconds(0.0003 * f64::from(k));
+        let half = waiting.len() / 2;
+        bench.driver.read(&waiting[..half], moment(0));
+        bench.driver.pass(moment(0));
+        bench.driver.answer(moment(1));
+        let mut written = bench.driver.take_output();
+        bench.driver.read(&waiting[half..], moment(2));
+        bench.driver.pass(moment(2));
+        bench.driver.answer(moment(3));
+        written.extend(bench.driver.take_output());
+        bench.driver.emergency(moment(4));
+        written.extend(bench.driver.take_output());
+        assert_eq!(written.len(), 24, "{stood_s}: {written:x?}");
+        assert!(matches!(bench.driver.standing(), Standing::Latched(_)), "{stood_s}");
+        bench.device.advance(bench.now + Seconds(STEP), &written);
+        bench.now = bench.now + Seconds(STEP);
+        bench.go(0.2);
+        assert_eq!((bench.device.command(), bench.driver.stopped()), (0, Stopped::Confirmed));
+        assert_eq!(bench.device.offences(), []);
+    }
+}
+
+#[test]
+fn a_motor_that_may_be_on_is_said_to_be_until_a_state_says_otherwise() {
+    for format in FORMATS {
+        // Nothing was ever driven: nothing has to be confirmed.
+        let mut bench = Bench::new(format, &Faults::default(), 1);
+        bench.driver.lost("unplugged");
+        bench.driver.emergency(bench.now);
+        assert_eq!(bench.driver.stopped(), Stopped::No, "{format:?}");
+
+        let mut bench = Bench::armed(format);
+        bench.wish = Some(0.4);
+        bench.go(0.1);
+        bench.driver.lost("unplugged");
+        for press in [Driver::emergency, Driver::disarm] {
+            press(&mut bench.driver, bench.now);
+            assert_eq!(bench.driver.stopped(), Stopped::Unconfirmed, "{format:?}");
+        }
+        assert!(bench.driver.take_output().is_empty(), "nobody is there");
+        bench.driver.opened(bench.now);
+        assert_eq!(bench.driver.stopped(), Stopped::Unconfirmed, "{format:?}: not heard yet");
+        bench.wish = None;
+        bench.go(2.0);
+        assert_eq!(bench.driver.stopped(), Stopped::Confirmed, "{format:?}");
+
+        let mut bench = Bench::new(format, &Faults::default(), 1);
+        bench.go(1.5);
+        bench.driver.home(bench.now).unwrap();
+        bench.go(2.0);
+        bench.driver.lost("unplugged");
+        assert_eq!(bench.driver.stopped(), Stopped::Unconfirmed, "{format:?}: it homes");
+    }
+}
+
+#[test]
+fn a_board_whose_cart_is_stuck_is_not_spoken_to_while_it_homes() {
+    let format = Format::Sensorsini31;
+    let mut device = emulator::Params { format, ..emulator::Params::default() };
+    device.rig.motor.viscous_n_s_per_m = 46.0;
+    let device = Emulator::new(&device, &Faults::default(), 1);
+    let mut bench = Bench::of(&params(format), PERIOD, device);
+    bench.go(1.5);
+    bench.driver.home(bench.now).unwrap();
+    bench.go(29.0);
+    assert!(!bench.driver.is_stuck(bench.now));
+    bench.go(2.0);
+    assert!(bench.driver.is_stuck(bench.now));
+    bench.driver.emergency(bench.now);
+    bench.driver.disarm(bench.now);
+    bench.go(5.0);
+    assert_eq!(*bench.driver.stage(), Stage::Homing);
+    assert_eq!(bench.device.offences(), []);
+}
+
+#[test]
 fn every_fault_that_stops_an_armed_device_is_named() {
     let jump = |sensor| Broken::Jump { sensor, counts: 1800 };
     let stuck = |sensor| Broken::Stuck { sensor, for_s: 3.0 };

@@ -35,6 +35,8 @@ const SILENCE: Seconds = Seconds(1.0);
 const QUIET: Seconds = Seconds(0.005);
 /// How long a stop may take to be confirmed at the end.
 const FAREWELL: Seconds = Seconds(0.4);
+/// How long the end of homing is waited for.
+const LONGEST: Seconds = Seconds(45.0);
 /// Whoever was silent for this part of the guard's patience may already share the port with it.
 const ALMOST: f64 = 0.9;
 
@@ -164,6 +166,11 @@ impl Ring for Bell {
     }
 }
 
+/// What is said of a calibration's file.
+fn told_of_shelf(what: &str) -> impl Fn(&shelf::Error) -> String {
+    move |error| format!("the calibration {what}: {error}")
+}
+
 /// The thread's own.
 struct Server {
     place: Place,
@@ -276,6 +283,7 @@ impl Server {
             match ask {
                 Ask::Wish(Wish::Arm) if !self.is_guarded() => {
                     self.station.refuse(NotArmed::Unguarded);
+                    self.replace_guard();
                 }
                 Ask::Wish(Wish::Arm) => {
                     // A person arms anew, after whatever stopped the motor.
@@ -287,6 +295,14 @@ impl Server {
                 Ask::Enable(is_held, at) => self.station.enable(is_held, at),
                 Ask::Close => self.is_over = true,
             }
+        }
+    }
+
+    /// A guard that is gone gets a successor, for the next time.
+    fn replace_guard(&mut self) {
+        let Some(link) = &mut self.link else { return };
+        if link.guard.as_ref().is_none_or(Guard::is_gone) {
+            link.guard = Guard::start(&link.port, &self.stop, self.patience).ok();
         }
     }
 
@@ -311,9 +327,12 @@ impl Server {
         let told = |error: &dyn std::error::Error| error.to_string();
         let path = self.place.address.path(&self.host).map_err(|error| told(&error))?;
         let device = self.place.address.identity(&self.host, &path);
-        let found = shelf::load(&self.place.shelf, &device).map_err(|error| told(&error))?;
+        let found = shelf::load(&self.place.shelf, &device);
         let (port, bell) = Port::open(&path, self.baud).map_err(|error| told(&error))?;
-        // Nothing fails from here on: what has a copy of the port would keep it locked.
+        // Nothing fails from here on: what has a copy of the port would keep it locked. A
+        // calibration that cannot be read is made anew.
+        self.not_kept = found.as_ref().err().map(told_of_shelf("cannot be read"));
+        let found = found.unwrap_or_default();
         let guard = Guard::start(&port, &self.stop, self.patience).ok();
         if let Ok(copy) = port.as_fd().try_clone_to_owned() {
             last_resort::arm(copy, &self.stop.burst);
@@ -388,9 +407,10 @@ impl Server {
 
     fn tell_guard(&mut self, watch: Watch) {
         if let Some(link) = &mut self.link {
+            // Taken before: what happens to this thread meanwhile the guard counts as silence.
+            self.beat_at = self.clock.now();
             link.beat(watch);
         }
-        self.beat_at = self.clock.now();
     }
 
     fn note_latency(&mut self) {
@@ -408,7 +428,7 @@ impl Server {
     fn keep_calibration(&mut self) {
         if let Some(calibration) = self.station.take_calibration() {
             let stored = shelf::store(&self.place.shelf, &calibration);
-            self.not_kept = stored.err().map(|error| error.to_string());
+            self.not_kept = stored.as_ref().err().map(told_of_shelf("could not be kept"));
         }
     }
 
@@ -426,7 +446,11 @@ impl Server {
     /// The motor stops, and is given time to say so. A device that homes cannot be stopped, and
     /// whoever spoke to it next would not know that it does: its end is waited for.
     fn say_farewell(&mut self) {
-        while self.link.is_some() && *self.station.driver().stage() == Stage::Homing {
+        let end = self.clock.now() + LONGEST;
+        let is_homing = |server: &Self| {
+            server.link.is_some() && *server.station.driver().stage() == Stage::Homing
+        };
+        while is_homing(self) && self.clock.now() < end {
             self.turn();
             self.show();
         }

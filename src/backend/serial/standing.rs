@@ -5,10 +5,6 @@ use crate::backend::safety::warden::Fault;
 use crate::backend::wire::{Flags, Outcome};
 use crate::signal::Seconds;
 
-/// What is said of homing that takes too long.
-pub(super) const STUCK: &str = "homing does not end: switch the motor's supply off, then look whether the \
-    cart is stuck";
-
 /// How far a device has come.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stage {

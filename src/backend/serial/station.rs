@@ -94,6 +94,8 @@ pub struct Look {
     pub stopped: Stopped,
     /// Whether the ends of the track are known.
     pub is_homed: bool,
+    /// Whether homing takes longer than it can.
+    pub is_stuck: bool,
     /// When the device was calibrated, or why that does not count.
     pub calibrated: Result<String, Uncalibrated>,
     /// What is on.
@@ -333,6 +335,7 @@ impl Station {
             standing: self.driver.standing(),
             stopped: self.driver.stopped(),
             is_homed: self.driver.is_homed(),
+            is_stuck: self.driver.is_stuck(now),
             calibrated: self.calibration().map(|found| found.at.clone()),
             duty: match &self.work {
                 Work::Rest => Duty::Rest,

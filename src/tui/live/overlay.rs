@@ -35,7 +35,7 @@ fn after_a_stop(view: &View<'_>) -> &'static [&'static str] {
             &["The motor is armed again.", "Enter   repeat the rollout", "q       end the session"]
         }
         Some(_) => &[
-            "The motor was told to stop.",
+            "Its page tells whether it is off.",
             "o       open the plant's page; there",
             "x       clears what stopped it, and",
             "m       arms the motor",

@@ -61,9 +61,14 @@ pub(super) fn of(page: &Page<'_>) -> Advice {
             .key("m", "then arm the motor"),
         (Stage::Opening, ..) => Advice::new(Role::Strong, "The device is being greeted.")
             .and("If it does not answer within seconds: look at its power and its baud."),
+        (Stage::Homing, ..) if look.is_stuck => {
+            Advice::new(Role::Alarm, "HOMING DOES NOT END: switch the motor's supply off.")
+                .and("Then look whether the cart is stuck. The motor pushes on until then.")
+        }
         (Stage::Homing, ..) => {
             Advice::new(Role::Strong, "The device looks for the ends of its track.")
                 .and("KEEP YOUR HANDS OFF: nothing can stop it but the motor's supply.")
+                .and("Whoever quits now waits until it is done.")
         }
         _ if page.panel.asks_home() => Advice::new(
             Role::Strong,
@@ -139,7 +144,7 @@ fn disarmed(page: &Page<'_>) -> Advice {
     };
     let advice = advice.and_refusal(page);
     match &page.view.not_kept {
-        Some(why) => advice.and(format!("The calibration could not be kept: {why}.")),
+        Some(why) => advice.and(sentence(why)),
         None => advice,
     }
 }

@@ -5,6 +5,9 @@ use crate::backend::safety::warden::Standing;
 use crate::backend::wire::StateFrame;
 use crate::signal::{Seconds, State};
 
+/// How long homing may take.
+pub(super) const HOMING: Seconds = Seconds(30.0);
+
 impl Driver {
     /// How far the device has come.
     #[must_use]
@@ -24,10 +27,22 @@ impl Driver {
         self.is_homed
     }
 
-    /// Whether the motor is known to be off after a stop.
+    /// Whether the motor is known to be off after a stop. Nobody can stop that of a device that
+    /// is gone or was not greeted yet: it is off if it was before, as far as is known.
     #[must_use]
     pub const fn stopped(&self) -> Stopped {
-        self.stopped
+        match (&self.stage, self.stopped) {
+            (Stage::Closed(_) | Stage::Opening, _) if self.may_move => Stopped::Unconfirmed,
+            (Stage::Closed(_), Stopped::Told | Stopped::Unconfirmed) => Stopped::Confirmed,
+            (_, stopped) => stopped,
+        }
+    }
+
+    /// Whether the device homes for longer than any track is long: its cart may be stuck, and
+    /// the motor pushes on.
+    #[must_use]
+    pub fn is_stuck(&self, now: Seconds) -> bool {
+        self.stage == Stage::Homing && now - self.since > HOMING
     }
 
     /// The latest state, and when it came.
