@@ -108,16 +108,17 @@ mod measure {
             PROFILES.into_iter().filter(|name| only.is_none_or(|only| only == name)).collect();
         let (tries, seconds) = (number("--tries", 20), number("--timing", 60));
         let sessions = number("--faults", 50);
+        let mut failures = 0;
         if tries > 0 {
-            stops(&profiles, tries);
+            failures += stops(&profiles, tries);
         }
         if seconds > 0 {
             rates(&profiles, number("--rate", 0), seconds);
         }
         if sessions > 0 {
-            faults(&profiles, sessions);
+            failures += faults(&profiles, sessions);
         }
-        ExitCode::SUCCESS
+        ExitCode::from(u8::from(failures > 0))
     }
 
     /// This program, which is coadapt as well.
@@ -125,25 +126,37 @@ mod measure {
         std::env::current_exe().unwrap()
     }
 
-    fn stops(profiles: &[&'static str], tries: u32) {
+    fn stops(profiles: &[&'static str], tries: u32) -> usize {
         println!("motor at 0 after, ms          min  median     max   above {LATE_MS} ms");
         let mut chance = stream(1, Purpose::Starts, Place::default());
+        let mut all_late = 0;
         for profile in profiles.iter().copied() {
             for (name, cause) in CAUSES {
                 let mut took: Vec<f64> = Vec::new();
+                let mut over = 0;
                 while took.len() < tries as usize {
-                    took.extend(stop(profile, cause, chance.random_range(0.0..0.05)));
+                    match stop(profile, cause, chance.random_range(0.0..0.05)) {
+                        Some(ms) => took.push(ms),
+                        None => over += 1,
+                    }
                 }
                 took.sort_by(f64::total_cmp);
                 let late = took.iter().filter(|took| **took > LATE_MS).count();
                 println!(
-                    "{profile:18} {name:8} {:6.1}  {:6.1}  {:6.1}   {late} of {tries}",
+                    "{profile:18} {name:8} {:6.1}  {:6.1}  {:6.1}   {late} of {tries}{}",
                     took[0],
                     took[took.len() / 2],
                     took[took.len() - 1],
+                    if over > 0 {
+                        format!(", {over} more were over before")
+                    } else {
+                        String::new()
+                    },
                 );
+                all_late += late;
             }
         }
+        all_late
     }
 
     /// How long the motor went on after `cause`, ms, which came so much `later` than any moment;
@@ -304,7 +317,7 @@ mod measure {
     }
 
     /// Sessions of random faults: how they ended, and whether the device got what it must not.
-    fn faults(profiles: &[&'static str], sessions: u32) {
+    fn faults(profiles: &[&'static str], sessions: u32) -> usize {
         println!("\nsessions of random faults");
         let mut forbidden = 0;
         for seed in 0..sessions {
@@ -323,6 +336,7 @@ mod measure {
             assert!(matches!(code, Some(0 | 1)), "{output:?}");
         }
         println!("{sessions} sessions, {forbidden} forbidden sends");
+        forbidden
     }
 
     fn ron(faults: &Faults) -> String {

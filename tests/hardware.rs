@@ -199,9 +199,12 @@ struct Driving {
 impl Driving {
     /// Begins a session, and waits until its motor is on.
     fn start(profile: &'static str) -> Self {
-        let sets = main_for(profile, "session.main_duration_s=4.0");
+        Self::with(profile, &main_for(profile, "session.main_duration_s=4.0"))
+    }
+
+    fn with(profile: &'static str, sets: &[&str]) -> Self {
         for _ in 0..TRIES {
-            let stand = Stand::new(program(), profile, &sets, "()");
+            let stand = Stand::new(program(), profile, sets, "()");
             let mut command = stand.armed_session();
             // A job of its own, as a shell starts it: what stops it can let it go on.
             command.process_group(0);
@@ -312,6 +315,30 @@ fn a_session_that_is_killed_or_stands_still_has_a_guard_that_stops_the_motor() {
             assert_peaceful(&driving.stand.trace());
         }
     }));
+}
+
+/// Longer than states may stay away, and about as long as the guard is patient.
+#[test]
+fn a_session_that_stands_still_for_a_moment_writes_no_more_than_a_board_holds() {
+    let cases = [65, 80, 95, 110].map(|pause_ms| {
+        move || {
+            // Without the patience of the other tests: a state may be 60 ms late.
+            let sets = [
+                &ready("physical-cart-pole")[..],
+                &["session.phases=[main]", "session.main_duration_s=8.0"],
+            ]
+            .concat();
+            let mut driving = Driving::with("physical-cart-pole", &sets);
+            driving.signal(Signal::STOP);
+            let mut clock = WallClock::start();
+            clock.wait_until(Seconds(f64::from(pause_ms) * 1e-3));
+            kill_process(Pid::from_child(&driving.process), Signal::CONT).unwrap();
+            let (ended, told) = driving.over();
+            assert_eq!(ended.code(), Some(1), "{pause_ms} ms: {told}");
+            assert_peaceful(&driving.stand.trace());
+        }
+    });
+    all_at_once(cases);
 }
 
 #[test]

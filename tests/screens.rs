@@ -500,6 +500,7 @@ fn results() -> results::Info {
             .map(str::to_owned)
             .chain((1..=10).map(|k| format!("policy-{:03}.json", k * 10)))
             .collect(),
+        alarm: None,
         summary: vec!["gate opened at step 2413, τ 2633 steps, final share 14 %".to_owned()],
         evaluation: Some((1..=10).map(|k| (k * 10, 1.4 * f64::from(k))).collect()),
         measure: yardstick("balance"),
@@ -512,6 +513,20 @@ fn results_picture(width: u16, height: u16, info: &results::Info, s: &results::S
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
     terminal.draw(|frame| results::draw(frame, info, s)).unwrap();
     terminal.backend().to_string()
+}
+
+#[test]
+fn results_after_a_stop_that_nobody_confirmed_say_so_on_every_page() {
+    let alarm = Some("THE STOP WAS NOT CONFIRMED: switch the motor's supply off.");
+    let info = results::Info { alarm, ..results() };
+    for (width, height) in [(80, 24), (120, 40)] {
+        let mut state = results::State::default();
+        for _ in 0..4 {
+            let screen = results_picture(width, height, &info, &state);
+            assert!(screen.contains("CONFIRMED: switch the motor's supply off."), "{screen}");
+            state.next();
+        }
+    }
 }
 
 #[test]

@@ -50,6 +50,9 @@ pub struct Served {
     /// The system let the port's thread go before all others of the computer.
     #[serde(default)]
     pub real_time: bool,
+    /// At the end the device said that its motor is off.
+    #[serde(default)]
+    pub motor_is_off: bool,
 }
 
 /// How well the host kept time.
@@ -176,6 +179,7 @@ mod tests {
             lost: 1,
             latency_us: Lateness { p50: 1, p99: 2, max: 3 },
             real_time: true,
+            motor_is_off: true,
         };
         let real = Timing { plant: Some(plant), ..simulated };
         for timing in [simulated, real] {

@@ -36,6 +36,8 @@ pub struct Finished {
     pub tenths: Vec<(u8, f64)>,
     /// The signal that ended it.
     pub signal: Option<i32>,
+    /// A real plant's device did not say that its motor is off.
+    pub motor_may_be_on: bool,
 }
 
 /// The JSON object of a session.
@@ -155,6 +157,8 @@ pub(super) fn conclude(
             lateness_us: lateness(&histogram),
             ..known
         });
+    let plant = timing.as_ref().and_then(|timing| timing.plant.as_ref());
+    let motor_may_be_on = plant.is_some_and(|plant| !plant.motor_is_off);
     let last = Sidecar {
         status,
         ended: Some(clock::timestamp()),
@@ -168,7 +172,15 @@ pub(super) fn conclude(
             folder.display()
         ))
     })?;
-    Ok(Finished { results, cause, folder, episodes, tenths: means, signal: signal() })
+    Ok(Finished {
+        results,
+        cause,
+        folder,
+        episodes,
+        tenths: means,
+        signal: signal(),
+        motor_may_be_on,
+    })
 }
 
 /// How main ended in each region of the task.

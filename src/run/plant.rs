@@ -9,7 +9,7 @@ use super::{RunError, tell};
 use crate::backend::safety::warden::Standing;
 use crate::backend::safety::{Limits, Safe};
 use crate::backend::serial::address::Address;
-use crate::backend::serial::desk::{Latency, View};
+use crate::backend::serial::desk::{Desk, Latency, View};
 use crate::backend::serial::driver::{Stage, Stopped};
 use crate::backend::serial::pump::{Place, Pump};
 use crate::backend::serial::station::{About, Wish};
@@ -39,7 +39,9 @@ const BETWEEN: Seconds = Seconds(0.1);
 
 /// A real plant at its port.
 pub(super) struct Real {
-    pump: Pump,
+    /// None once it was stopped.
+    pump: Option<Pump>,
+    desk: Desk,
     clock: WallClock,
     manner: Manner,
     params: serial::Params,
@@ -142,7 +144,8 @@ impl Real {
         let place = Place { address, shelf: logs.join(SHELF) };
         let pump = Pump::start(&params, place, about, clock)
             .map_err(|error| RunError::Failed(error.to_string()))?;
-        let real = Self { pump, clock, manner, params, port, half_track };
+        let desk = pump.desk().clone();
+        let real = Self { pump: Some(pump), desk, clock, manner, params, port, half_track };
         if let Company::Armed(shutdown) = company
             && let Err(error) = real.arm(shutdown)
         {
@@ -156,7 +159,7 @@ impl Real {
     fn arm(&self, shutdown: &Shutdown) -> Result<(), RunError> {
         let is_ready = |view: &View| view.look.stage == Stage::Ready;
         self.wait(shutdown, APPEARS, None, is_ready, "the device does not become ready")?;
-        let desk = self.pump.desk();
+        let desk = &self.desk;
         desk.see(|view| view.look.calibrated.clone()).map_err(|why| {
             self.failed(&format!(
                 "{why}; run this profile once without --headless, and press o, then c"
@@ -183,7 +186,7 @@ impl Real {
         is_true: impl Fn(&View) -> bool,
         otherwise: &str,
     ) -> Result<(), RunError> {
-        let desk = self.pump.desk();
+        let desk = &self.desk;
         let end = self.clock.now() + patience;
         loop {
             if let Some(signal) = shutdown.signal() {
@@ -217,20 +220,20 @@ impl Real {
         let Manner { limit, stale, .. } = self.manner;
         // The plant's own guard, which knows more, is to be heard first.
         let stale = stale * 2.0;
-        let wired = Wired::new(self.pump.desk().clone(), self.clock, self.manner.clone());
+        let wired = Wired::new(self.desk.clone(), self.clock, self.manner.clone());
         Safe::new(Box::new(wired), Limits { action: limit, stale })
     }
 
     /// The clock of its states.
     pub(super) fn metronome(&self) -> Metronome {
-        Metronome::new(self.pump.desk().clone(), self.clock, self.manner.period)
+        Metronome::new(self.desk.clone(), self.clock, self.manner.period)
     }
 
     /// What the screen needs of it.
     pub(super) fn at_the_screen(&self) -> PlantDesk {
         let safety = &self.params.safety;
         PlantDesk {
-            desk: self.pump.desk().clone(),
+            desk: self.desk.clone(),
             facts: Facts {
                 port: self.port.clone(),
                 format: self.params.format,
@@ -245,7 +248,7 @@ impl Real {
 
     /// What `session.json` calls it.
     pub(super) fn name(&self) -> String {
-        let look = self.pump.desk().view().look;
+        let look = self.desk.view().look;
         let calibrated =
             look.calibrated.map_or_else(|why| why.to_string(), |at| format!("calibrated {at}"));
         format!("{}, {calibrated}", look.device)
@@ -253,29 +256,41 @@ impl Real {
 
     /// Stops the motor and closes the port, and tells how well the plant was served. A stop that
     /// is not confirmed is said aloud.
-    pub(super) fn close(self) -> Served {
-        let format = self.params.format;
-        let desk = self.pump.desk().clone();
-        if desk.see(|view| view.look.stage == Stage::Homing) && !is_taken() {
+    pub(super) fn close(mut self) -> Served {
+        let motor_is_off = self.stop();
+        let View { look, latency, is_first, .. } = self.desk.view();
+        let Latency { p50_us: p50, p99_us: p99, max_us: max } = latency;
+        Served {
+            states: look.states,
+            lost: look.lost,
+            latency_us: Lateness { p50, p99, max },
+            real_time: is_first,
+            motor_is_off,
+        }
+    }
+
+    /// Stops the motor, and tells whether it is known to be off; if it is not, a person as well.
+    fn stop(&mut self) -> bool {
+        let Some(pump) = self.pump.take() else { return true };
+        if self.desk.see(|view| view.look.stage == Stage::Homing) && !is_taken() {
             tell("waiting for the device to end its homing, which nothing can stop: hands off");
         }
-        match self.pump.close() {
-            Stopped::Confirmed | Stopped::No => {}
-            Stopped::Told | Stopped::Unconfirmed => tell_later(&format!(
+        let is_off = matches!(pump.close(), Stopped::Confirmed | Stopped::No);
+        if !is_off {
+            tell_later(&format!(
                 "THE STOP WAS NOT CONFIRMED by the device: {}",
-                out_of_reach(format)
-            )),
+                out_of_reach(self.params.format)
+            ));
         }
-        served(&desk.view())
+        is_off
     }
 }
 
-/// What a session keeps of how its plant was served.
-const fn served(view: &View) -> Served {
-    let Latency { p50_us: p50, p99_us: p99, max_us: max } = view.latency;
-    let latency_us = Lateness { p50, p99, max };
-    let View { look, is_first, .. } = view;
-    Served { states: look.states, lost: look.lost, latency_us, real_time: *is_first }
+impl Drop for Real {
+    /// Whatever went wrong: the motor stops, and nobody is left in doubt whether it did.
+    fn drop(&mut self) {
+        self.stop();
+    }
 }
 
 /// What to do about a motor that nobody can reach.

@@ -182,7 +182,9 @@ impl Stage {
         match self.running.take().map(JoinHandle::join) {
             Some(Ok(Ok(finished))) => self.last = Some(finished),
             Some(Ok(Err(error))) => tell_later(&error.to_string()),
-            Some(Err(_)) => tell_later("the control thread failed; the plant is stopped"),
+            Some(Err(_)) => {
+                tell_later("the control thread failed, after it was told to stop the plant");
+            }
             None => {}
         }
     }
@@ -228,8 +230,8 @@ impl Conductor for Stage {
                 Ok(info)
             }
             Ok(Err(error)) => Err(error.to_string()),
-            Err(_) => Err("the control thread failed; the plant is stopped, and the session up \
-                           to then is kept and can be resumed"
+            Err(_) => Err("the control thread failed, after the plant was told to stop; the \
+                           session up to then is kept and can be resumed"
                 .to_owned()),
         })
     }
@@ -331,6 +333,9 @@ fn results_info(finished: &Finished) -> results::Info {
         folder: PathBuf::from(&finished.folder).display().to_string(),
         files,
         summary,
+        alarm: finished
+            .motor_may_be_on
+            .then_some("THE STOP WAS NOT CONFIRMED: switch the motor's supply off."),
         evaluation: (!finished.tenths.is_empty()).then(|| finished.tenths.clone()),
         measure: results.yardstick(),
         start: results.is_of(Balance::NAME).then_some(results::Start::RELEASE),

@@ -35,6 +35,8 @@ pub struct Info {
     pub files: Vec<String>,
     /// What else is to be said of it, a line each.
     pub summary: Vec<String>,
+    /// What a person must see first.
+    pub alarm: Option<&'static str>,
     /// The robot alone after each tenth of main: percent of main, mean of the measure.
     pub evaluation: Option<Vec<(u8, f64)>>,
     /// What rollouts are measured by.
@@ -54,6 +56,7 @@ impl Default for Info {
             folder: String::new(),
             files: Vec::new(),
             summary: Vec::new(),
+            alarm: None,
             evaluation: None,
             measure: yardstick(Balance::NAME),
             start: None,
@@ -136,7 +139,11 @@ fn whole(pen: &mut Pen<'_>, info: &Info, state: &State) {
     pen.text(x + 3, 0, &cut(&info.title, room.into()), Role::Strong);
     pen.text_until(width - 1, 0, &info.finish, Role::Strong);
     let last = height - 1;
-    if width >= 120 && height >= 40 {
+    let is_wide = width >= 120 && height >= 40;
+    if let Some(alarm) = info.alarm {
+        pen.text(1, if is_wide { 1 } else { 2 }, alarm, Role::Alarm);
+    }
+    if is_wide {
         let (half, upper) = (width / 2, (height - 3) / 2);
         for (page, (column, row)) in (0..).zip([(0, 0), (half, 0), (0, upper), (half, upper)]) {
             let mut part = pen.part(column, 2 + row, half - 1, upper);

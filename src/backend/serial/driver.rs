@@ -23,8 +23,6 @@ use crate::backend::safety::warden::{Fault, Observation, Standing, Wanted, Warde
 use crate::backend::wire::{Codec, Counts, Flags, Format, Message, Order, Outcome, StateFrame};
 use crate::signal::Seconds;
 
-/// Within this time a burst of stops is enough.
-const BURST: Seconds = Seconds(0.005);
 /// A device that homes is silent, or says that it does, from this time on.
 const HOMING_SHOWS: Seconds = Seconds(0.5);
 /// So many states after it tell that it does not: none of them was under way for so long.
@@ -457,10 +455,6 @@ impl Driver {
             self.write(&Order::Stop);
             self.burst = Some(now);
         }
-    }
-
-    fn has_just_stopped(&self, now: Seconds) -> bool {
-        self.burst.is_some_and(|at| now - at < BURST)
     }
 
     fn ready(&mut self, now: Seconds) {

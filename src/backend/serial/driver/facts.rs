@@ -5,8 +5,10 @@ use crate::backend::safety::warden::Standing;
 use crate::backend::wire::StateFrame;
 use crate::signal::{Seconds, State};
 
+/// Within this time a burst of stops is enough.
+const BURST: Seconds = Seconds(0.005);
 /// How long homing may take.
-pub(super) const HOMING: Seconds = Seconds(30.0);
+const HOMING: Seconds = Seconds(30.0);
 
 impl Driver {
     /// How far the device has come.
@@ -36,6 +38,11 @@ impl Driver {
             (Stage::Closed(_), Stopped::Told | Stopped::Unconfirmed) => Stopped::Confirmed,
             (_, stopped) => stopped,
         }
+    }
+
+    /// Whether a burst of stops is the last word, and enough.
+    pub(super) fn has_just_stopped(&self, now: Seconds) -> bool {
+        self.burst.is_some_and(|at| now - at < BURST)
     }
 
     /// Whether the device homes for longer than any track is long: its cart may be stuck, and
