@@ -55,6 +55,8 @@ pub(super) fn emulate(words: &cli::Emulate) -> Result<ExitCode, RunError> {
     // A real device keeps its time whatever this computer does.
     #[cfg(unix)]
     priority::go_first(Urgency::Motor);
+    // Before a hand can pull the cable, it is in.
+    stand.plug()?;
     while stand.notes.is_read {
         if let Some(signal) = shutdown.signal() {
             return Ok(signal_code(signal));
