@@ -61,9 +61,8 @@ mod measure {
     use std::thread::JoinHandle;
     use std::time::Duration;
 
-    use coadapt::backend::emulator::faults::{Fault, Faults, Noise, Timed};
+    use coadapt::backend::emulator::faults::{Faults, Noise};
     use coadapt::backend::emulator::port::Port;
-    use coadapt::backend::emulator::rig::Sensor;
     use coadapt::clock::{Clock, WallClock};
     use coadapt::random::{Place, Purpose, stream};
     use coadapt::signal::Seconds;
@@ -76,6 +75,15 @@ mod measure {
     use super::victim::PANICS;
 
     const PROFILES: [&str; 2] = ["physical-cart-pole", "cobs-cart-pole"];
+    /// The most noise of a session of faults.
+    const NOISE: Noise = Noise {
+        drop: 0.002,
+        duplicate: 0.002,
+        flip: 0.002,
+        truncate: 0.01,
+        delay: 0.02,
+        longest_delay_s: 0.03,
+    };
     /// Later than this is too late.
     const LATE_MS: f64 = 150.0;
 
@@ -323,10 +331,10 @@ mod measure {
         for seed in 0..sessions {
             let mut chance = stream(u64::from(seed), Purpose::Starts, Place::default());
             let profile = profiles[seed as usize % profiles.len()];
-            let faults = random_faults(&mut chance);
+            let faults = Faults::random(&mut chance, &NOISE, 12.0);
             let mut sets = ready(profile);
             sets.extend(["session.phases=[main]", "session.main_duration_s=6.0"]);
-            let stand = Stand::new(&program(), profile, &sets, &ron(&faults));
+            let stand = Stand::new(&program(), profile, &sets, &ron::to_string(&faults).unwrap());
             let output = stand.armed_session().output().unwrap();
             let trace = stand.end();
             let bad: Vec<_> = offences(&trace).iter().map(|line| line.entry.to_string()).collect();
@@ -337,45 +345,6 @@ mod measure {
         }
         println!("{sessions} sessions, {forbidden} forbidden sends");
         forbidden
-    }
-
-    fn ron(faults: &Faults) -> String {
-        ron::to_string(faults).unwrap()
-    }
-
-    /// Faults as they come.
-    fn random_faults(chance: &mut impl RngExt) -> Faults {
-        let mut noise = || {
-            let mut rare = |most: f64| {
-                if chance.random_bool(0.3) { chance.random_range(0.0..most) } else { 0.0 }
-            };
-            Noise {
-                drop: rare(0.002),
-                duplicate: rare(0.002),
-                flip: rare(0.002),
-                truncate: rare(0.01),
-                delay: rare(0.02),
-                longest_delay_s: 0.03,
-            }
-        };
-        let (to_host, to_device) = (noise(), noise());
-        let mut events = Vec::new();
-        for _ in 0..chance.random_range(0..3) {
-            let for_s = chance.random_range(0.01..0.3);
-            let sensor = if chance.random_bool(0.5) { Sensor::Angle } else { Sensor::Position };
-            let what = match chance.random_range(0..7) {
-                0 => Fault::Stall { for_s },
-                1 => Fault::Reset,
-                2 => Fault::Unplug { for_s },
-                3 => Fault::Stuck { sensor, for_s },
-                4 => Fault::Jump { sensor, counts: chance.random_range(-2000..2000) },
-                5 => Fault::Garbage { bytes: chance.random_range(1..200) },
-                _ => Fault::Estop { for_s },
-            };
-            events.push(Timed { at_s: chance.random_range(0.0..12.0), what });
-        }
-        let garbage_at_connect = chance.random_range(0..50);
-        Faults { to_host, to_device, garbage_at_connect, version: None, events }
     }
 
     /// The `session.json` of so many seconds of teaching, and what the session said.

@@ -11,6 +11,7 @@
 //! )
 //! ```
 
+use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
 use super::rig::Sensor;
@@ -99,6 +100,54 @@ pub enum Fault {
         /// How long, s.
         for_s: f64,
     },
+}
+
+impl Faults {
+    /// Faults as they come within `time_s`, with up to `most` of each noise on either way.
+    pub fn random(chance: &mut impl RngExt, most: &Noise, time_s: f64) -> Self {
+        let (to_host, to_device) = (most.random(chance), most.random(chance));
+        let mut events = Vec::new();
+        for _ in 0..chance.random_range(0..3) {
+            let what = Fault::random(chance);
+            events.push(Timed { at_s: chance.random_range(0.0..time_s), what });
+        }
+        let garbage_at_connect = chance.random_range(0..50);
+        Self { to_host, to_device, garbage_at_connect, version: None, events }
+    }
+}
+
+impl Noise {
+    /// Noise of which each kind is there or not, and at most as much as here.
+    fn random(&self, chance: &mut impl RngExt) -> Self {
+        let mut rare = |most: f64| {
+            if chance.random_bool(0.3) { chance.random_range(0.0..most) } else { 0.0 }
+        };
+        Self {
+            drop: rare(self.drop),
+            duplicate: rare(self.duplicate),
+            flip: rare(self.flip),
+            truncate: rare(self.truncate),
+            delay: rare(self.delay),
+            longest_delay_s: self.longest_delay_s,
+        }
+    }
+}
+
+impl Fault {
+    /// Any fault, short where it lasts.
+    fn random(chance: &mut impl RngExt) -> Self {
+        let for_s = chance.random_range(0.01..0.3);
+        let sensor = if chance.random_bool(0.5) { Sensor::Angle } else { Sensor::Position };
+        match chance.random_range(0..7) {
+            0 => Self::Stall { for_s },
+            1 => Self::Reset,
+            2 => Self::Unplug { for_s },
+            3 => Self::Stuck { sensor, for_s },
+            4 => Self::Jump { sensor, counts: chance.random_range(-2000..2000) },
+            5 => Self::Garbage { bytes: chance.random_range(1..200) },
+            _ => Self::Estop { for_s },
+        }
+    }
 }
 
 impl Check for Faults {

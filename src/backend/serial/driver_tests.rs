@@ -268,46 +268,15 @@ fn every_fault_that_stops_an_armed_device_is_named() {
     assert!(pressed.contains("its emergency stop is pressed"), "{pressed}");
 }
 
-/// Faults as they come within `time_s`, for the session `seed`.
-fn random_faults(seed: u64, time_s: f64) -> Faults {
-    let mut chance = stream(seed, Purpose::Starts, Place::default());
-    let mut noise = || {
-        let mut rare = |most: f64| {
-            if chance.random_bool(0.3) { chance.random_range(0.0..most) } else { 0.0 }
-        };
-        Noise {
-            drop: rare(0.01),
-            duplicate: rare(0.01),
-            flip: rare(0.01),
-            truncate: rare(0.05),
-            delay: rare(0.05),
-            longest_delay_s: 0.05,
-        }
-    };
-    let (to_host, to_device) = (noise(), noise());
-    let mut events = Vec::new();
-    for _ in 0..chance.random_range(0..3) {
-        let for_s = chance.random_range(0.01..0.3);
-        let sensor = if chance.random_bool(0.5) { Sensor::Angle } else { Sensor::Position };
-        let what = match chance.random_range(0..7) {
-            0 => Broken::Stall { for_s },
-            1 => Broken::Reset,
-            2 => Broken::Unplug { for_s },
-            3 => Broken::Stuck { sensor, for_s },
-            4 => Broken::Jump { sensor, counts: chance.random_range(-2000..2000) },
-            5 => Broken::Garbage { bytes: chance.random_range(1..200) },
-            _ => Broken::Estop { for_s },
-        };
-        events.push(Timed { at_s: chance.random_range(0.0..time_s), what });
-    }
-    Faults {
-        to_host,
-        to_device,
-        garbage_at_connect: chance.random_range(0..50),
-        version: None,
-        events,
-    }
-}
+/// The most noise of a session.
+const NOISE: Noise = Noise {
+    drop: 0.01,
+    duplicate: 0.01,
+    flip: 0.01,
+    truncate: 0.05,
+    delay: 0.05,
+    longest_delay_s: 0.05,
+};
 
 /// Sessions of random faults: whatever happens, the driver writes nothing that it must not,
 /// and no command beyond the limits is ever on the motor's pins for its doing.
@@ -318,7 +287,9 @@ fn sessions(count: u64) -> Reached {
         // Homing takes its time; without it there is more time for all else.
         let homes = seed % 8 < 2;
         let step_s = if homes { 0.4 } else { 0.05 };
-        let mut bench = Bench::new(format, &random_faults(seed, 60.0 * step_s), seed);
+        let mut chance = stream(seed, Purpose::Starts, Place::default());
+        let faults = Faults::random(&mut chance, &NOISE, 60.0 * step_s);
+        let mut bench = Bench::new(format, &faults, seed);
         bench.driver.params.homing = homes;
         bench.driver.opened(Seconds(0.0));
         let mut chance = stream(seed, Purpose::EvaluationStarts, Place::default());

@@ -324,11 +324,10 @@ impl Server {
 
     /// Opens the device's port, with its guard, or tells why not.
     fn connect(&mut self) -> Result<(), String> {
-        let told = |error: &dyn std::error::Error| error.to_string();
-        let path = self.place.address.path(&self.host).map_err(|error| told(&error))?;
+        let path = self.place.address.path(&self.host).map_err(|error| error.to_string())?;
         let device = self.place.address.identity(&self.host, &path);
         let found = shelf::load(&self.place.shelf, &device);
-        let (port, bell) = Port::open(&path, self.baud).map_err(|error| told(&error))?;
+        let (port, bell) = Port::open(&path, self.baud).map_err(|error| error.to_string())?;
         // Nothing fails from here on: what has a copy of the port would keep it locked. A
         // calibration that cannot be read is made anew.
         self.not_kept = found.as_ref().err().map(told_of_shelf("cannot be read"));
