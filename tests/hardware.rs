@@ -324,7 +324,7 @@ fn a_session_that_is_killed_or_stands_still_has_a_guard_that_stops_the_motor() {
 /// Longer than states may stay away, and about as long as the guard is patient.
 #[test]
 fn a_session_that_stands_still_for_a_moment_writes_no_more_than_a_board_holds() {
-    let cases = [65, 80, 95, 110].map(|pause_ms| {
+    let cases = [65, 75, 85, 100].map(|pause_ms| {
         move || {
             // Without the patience of the other tests: a state may be 60 ms late.
             let sets = [

@@ -33,7 +33,7 @@ use crate::signal::Seconds;
 pub use vigil::Watch;
 
 /// How long an armed program may be silent before the guard stops the motor.
-pub const PATIENCE: Seconds = Seconds(0.1);
+pub const PATIENCE: Seconds = Seconds(0.08);
 /// How long this program waits for its guard to go. Longer takes only one that stops the motor.
 const FAREWELL: Duration = Duration::from_millis(50);
 

@@ -1,10 +1,12 @@
 //! Signals: a real plant stops, then the session ends the way a key ends it, or halts.
 
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
+use nix::sys::signal::{SigSet, Signal};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGTTIN};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level::{emulate_default_handler, raise, signal_name};
@@ -36,12 +38,9 @@ impl Shutdown {
         let shutdown = Self::default();
         if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP, SIGTSTP]) {
             let heard = shutdown.clone();
-            let listener = std::thread::Builder::new().name("coadapt-signals".to_owned());
             // Without a listener signals keep their default: the program ends at once,
             // and the session can be resumed.
-            let _ = listener.spawn(move || {
-                // A computer that is busy must not keep a stop waiting.
-                priority::go_first(Urgency::Motor);
+            let _ = spawn_listener(move || {
                 for signal in signals.forever() {
                     last_resort::stop();
                     match signal {
@@ -89,6 +88,26 @@ impl Shutdown {
             session.insist(interrupt(signal));
         }
     }
+}
+
+/// Starts the one thread that signals come to. A computer that is busy keeps it waiting no longer
+/// than the motor; any other thread that a signal came to might first have to wait its turn.
+fn spawn_listener(listen: impl FnOnce() + Send + 'static) -> io::Result<()> {
+    let signals =
+        SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP, Signal::SIGTSTP]);
+    // Threads that this one starts inherit it.
+    signals.thread_block()?;
+    let listener = std::thread::Builder::new().name("coadapt-signals".to_owned());
+    let started = listener.spawn(move || {
+        priority::go_first(Urgency::Motor);
+        // What came meanwhile comes now.
+        let _ = signals.thread_unblock();
+        listen();
+    });
+    if started.is_err() {
+        signals.thread_unblock()?;
+    }
+    started.map(drop)
 }
 
 /// Gives the terminal back, unless it takes nothing any more, as over a link that stalls.
