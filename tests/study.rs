@@ -8,8 +8,9 @@ mod desk;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::time::Duration;
 
+use coadapt::clock::{Clock, WallClock};
+use coadapt::signal::Seconds;
 use desk::{Desk, names, text};
 use serde_json::Value;
 
@@ -142,15 +143,16 @@ fn a_killed_study_goes_on_where_it_was() {
         .stderr(std::process::Stdio::null())
         .spawn()
         .unwrap();
-    let finished = || names(&desk.at("cut/runs")).iter().filter(|n| n.ends_with(".json")).count();
-    while finished() < 2 && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(Duration::from_millis(2));
+    let mut clock = WallClock::start();
+    let second = desk.at("cut/runs/00002.json");
+    while !second.exists() && child.try_wait().unwrap().is_none() {
+        clock.wait_until(clock.now() + Seconds(0.002));
     }
     child.kill().unwrap();
     child.wait().unwrap();
     let first = fs::read(desk.at("cut/runs/00001.json")).unwrap();
     // A file that was not written whole is no result.
-    fs::write(desk.at("cut/runs/00002.json"), "{\"schema\":1,").unwrap();
+    fs::write(&second, "{\"schema\":1,").unwrap();
     let output = desk.run(line);
     assert!(output.status.success());
     assert!(text(&output.stderr).contains("runs are in cut already"), "{}", text(&output.stderr));

@@ -278,15 +278,15 @@ fn array(
 /// The words that say the same study to a shell.
 fn said(words: &cli::StudyWords) -> String {
     let quoted = |word: &str| format!("'{}'", word.replace('\'', r"'\''"));
-    let mut said = quoted(&found_again(words.study.as_deref().unwrap_or_default()));
+    let mut said = vec![quoted(&found_again(words.study.as_deref().unwrap_or_default()))];
     for (key, value) in &words.set {
-        said += &format!(" --set {}", quoted(&format!("{key}={value}")));
+        said.extend(["--set".to_owned(), quoted(&format!("{key}={value}"))]);
     }
     if let Some(seeds) = words.seeds {
-        said += &format!(" --seeds {seeds}");
+        said.extend(["--seeds".to_owned(), seeds.to_string()]);
     }
     if words.keep_steps {
-        said += " --keep-steps";
+        said.push("--keep-steps".to_owned());
     }
-    said
+    said.join(" ")
 }

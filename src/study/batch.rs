@@ -49,7 +49,7 @@ pub use results::{Cells, Done, Point, Row, Table, Trajectory};
 pub use session::{Failure, perform, person};
 pub use summary::{Difference, Group, Summary, summarise};
 pub use table::write_table;
-pub use work::{Desk, Progress, Tally, work};
+pub use work::{Desk, Perform, Progress, Tally, work};
 
 /// Why a study was not done.
 #[derive(Debug, thiserror::Error)]

@@ -208,7 +208,7 @@ impl Board<'_> {
         &self,
         fields: &Fields,
         pair: &Pair,
-        (wholes, singles): (&mut Vec<(Compared, Cell)>, &mut Vec<(Compared, u32, Cell)>),
+        (wholes, singles): (&mut Wholes, &mut Singles),
     ) {
         let less_is_better = !yardstick(self.study.task()).more_is_better;
         for (place, arms) in fields {
@@ -291,6 +291,11 @@ type Place = (String, String, u8, String);
 type Fields = BTreeMap<Place, BTreeMap<(String, String), Vec<OfRun>>>;
 /// What is compared, and where.
 type Compared = (Place, Pair);
+type Wholes = Vec<(Compared, Cell)>;
+type Singles = Vec<(Compared, u32, Cell)>;
+/// The same as columns.
+type Labelled<'a> = (&'a str, &'a str, u8, &'a str, Side<'a>, Side<'a>);
+type Side<'a> = (&'a str, &'static str);
 
 const COMPARED: [&str; 8] =
     ["setting", "operator", "checkpoint", "start", "arm", "readout", "from_arm", "from_readout"];
@@ -357,9 +362,7 @@ impl Cell {
 }
 
 /// The labels of a row, one after the other.
-fn flat(
-    ((setting, operator, checkpoint, start), Pair { of, from }): &Compared,
-) -> (&str, &str, u8, &str, (&str, &'static str), (&str, &'static str)) {
+fn flat(((setting, operator, checkpoint, start), Pair { of, from }): &Compared) -> Labelled<'_> {
     (setting, operator, *checkpoint, start, (&of.0, of.1.word()), (&from.0, from.1.word()))
 }
 

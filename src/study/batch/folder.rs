@@ -104,7 +104,7 @@ impl Folder {
     #[must_use]
     pub fn open_runs<'a>(&self, study: &'a Study, shard: Shard) -> (Vec<&'a Run>, usize) {
         let (done, open): (Vec<&Run>, Vec<&Run>) =
-            study.share(shard).partition(|run| read(&self.path, run.number).is_some_and(is_done));
+            study.share(shard).partition(|run| is_done(&self.path, run.number));
         (open, done.len())
     }
 
@@ -140,8 +140,8 @@ pub fn read(folder: &Path, number: u32) -> Option<Kept> {
     record::read_document::<Kept>(&file(folder, number)).ok()
 }
 
-fn is_done(kept: Kept) -> bool {
-    matches!(kept.outcome, Outcome::Done(_))
+fn is_done(folder: &Path, number: u32) -> bool {
+    read(folder, number).is_some_and(|kept| matches!(kept.outcome, Outcome::Done(_)))
 }
 
 /// The card of the study in `folder`.

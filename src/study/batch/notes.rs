@@ -107,7 +107,7 @@ impl Witness for Notes {
         }
         self.tenth.push(*row);
         self.values.extend((yardstick(self.task).of)(row));
-        if row.episode % self.every == 0 {
+        if row.episode.is_multiple_of(self.every) {
             let value = mean(&std::mem::take(&mut self.values));
             let (episode, success) = (row.episode, row.success.unwrap_or(0.0));
             self.curve.push(Point { episode, success, share: row.share.unwrap_or(1.0), value });

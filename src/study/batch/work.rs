@@ -34,6 +34,9 @@ pub struct Tally {
     pub left: usize,
 }
 
+/// Carries out a run, unless it is asked to give up.
+pub type Perform<'a> = dyn Fn(&Run, &dyn Fn() -> bool) -> Result<Done, Failure> + Sync + 'a;
+
 /// What work on runs needs.
 pub struct Desk<'a> {
     /// Where they are kept.
@@ -53,11 +56,7 @@ pub struct Desk<'a> {
 ///
 /// # Errors
 /// When something could not be kept; what is finished stays.
-pub fn work(
-    runs: &[&Run],
-    desk: &Desk<'_>,
-    perform: &(dyn Fn(&Run, &dyn Fn() -> bool) -> Result<Done, Failure> + Sync),
-) -> Result<Tally, StudyError> {
+pub fn work(runs: &[&Run], desk: &Desk<'_>, perform: &Perform<'_>) -> Result<Tally, StudyError> {
     let (next, over) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let tally = Mutex::new(Tally::default());
     let refused = Mutex::new(None);
@@ -95,20 +94,18 @@ pub fn work(
         }
         worker();
     });
-    match refused.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        Some(error) => Err(error),
-        None => {
-            let mut tally = tally.into_inner().unwrap_or_else(PoisonError::into_inner);
-            tally.left = runs.len() - tally.done - tally.failed;
-            Ok(tally)
-        }
+    if let Some(error) = refused.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        return Err(error);
     }
+    let mut tally = tally.into_inner().unwrap_or_else(PoisonError::into_inner);
+    tally.left = runs.len() - tally.done - tally.failed;
+    Ok(tally)
 }
 
 /// Carries out `run`; nothing is kept of one that was given up.
 fn attempt(
     run: &Run,
-    perform: &(dyn Fn(&Run, &dyn Fn() -> bool) -> Result<Done, Failure> + Sync),
+    perform: &Perform<'_>,
     ends: &dyn Fn() -> bool,
     memory: &dyn Fn() -> Option<f64>,
 ) -> Option<Kept> {
