@@ -142,19 +142,24 @@ mod measure {
             for (name, cause) in CAUSES {
                 let mut took: Vec<f64> = Vec::new();
                 let mut over = 0;
-                while took.len() < tries as usize {
+                while took.len() < tries as usize && over <= tries {
                     match stop(profile, cause, chance.random_range(0.0..0.05)) {
                         Some(ms) => took.push(ms),
                         None => over += 1,
                     }
                 }
                 took.sort_by(f64::total_cmp);
+                let (Some(least), Some(most)) = (took.first(), took.last()) else {
+                    println!("{profile:18} {name:8} no session came as far as to drive");
+                    all_late += 1;
+                    continue;
+                };
                 let late = took.iter().filter(|took| **took > LATE_MS).count();
                 println!(
                     "{profile:18} {name:8} {:6.1}  {:6.1}  {:6.1}   {late} of {tries}{}",
-                    took[0],
+                    least,
                     took[took.len() / 2],
-                    took[took.len() - 1],
+                    most,
                     if over > 0 {
                         format!(", {over} more were over before")
                     } else {

@@ -5,7 +5,7 @@ use coadapt::backend::serial::calibration::Step;
 use coadapt::backend::serial::desk::{Latency, View};
 use coadapt::backend::serial::shelf::Uncalibrated;
 use coadapt::backend::serial::standing::{NotArmed, Stage, Stopped};
-use coadapt::backend::serial::station::{Calibrating, Duty, Look, Wish};
+use coadapt::backend::serial::station::{Calibrating, Duty, Grip, Look, Wish};
 use coadapt::backend::wire::{Counts, Format, Outcome};
 use coadapt::signal::{Seconds, State};
 use coadapt::tui::keys::Action;
@@ -38,7 +38,7 @@ fn ready() -> View {
         is_stuck: false,
         calibrated: Ok("2026-03-14T09:26:53Z".to_owned()),
         duty: Duty::Rest,
-        is_enabled: false,
+        grip: Grip::Off,
         refused: None,
         latest: Some((State::new([0.053, 0.0, 3.12, -0.02]), Seconds(61.0))),
         states: 3_071,
@@ -225,7 +225,13 @@ fn a_motor_that_is_off_and_one_that_is_armed() {
     pictures!("off", ready());
     let mut view = with(|look| look.standing = Standing::Armed);
     pictures!("armed", view);
-    view.look.is_enabled = true;
+    view.look.grip = Grip::LeftOn;
+    let told = picture(&view);
+    assert!(
+        told.contains("Let go of the switch") && told.contains("since before arming"),
+        "{told}"
+    );
+    view.look.grip = Grip::On;
     pictures!("hand_on", view);
     view.look.latest = Some((State::new([-0.174, -0.2, 0.09, 0.42]), Seconds(62.0)));
     view.look.duty = Duty::Follow;
@@ -392,7 +398,9 @@ fn the_scene_says_how_the_motor_stands() {
     assert_eq!(words(&view), "motor off: o arms it");
     view.look.standing = Standing::Armed;
     assert_eq!(words(&view), "motor ARMED: hold L1");
-    view.look.is_enabled = true;
+    view.look.grip = Grip::LeftOn;
+    assert_eq!(words(&view), "motor ARMED: let go of the switch");
+    view.look.grip = Grip::On;
     assert_eq!(words(&view), "motor ARMED, hand on");
     view.look.standing = Standing::Latched(Fault::Stopped);
     assert_eq!(words(&view), "motor STOPPED: o tells why");

@@ -10,6 +10,7 @@ use signal_hook::iterator::Signals;
 use signal_hook::low_level::{emulate_default_handler, raise, signal_name};
 
 use crate::backend::guard::last_resort;
+use crate::backend::priority::{self, Urgency};
 use crate::clock::{Clock, WallClock};
 use crate::control::snapshot::{Command, Watcher};
 use crate::signal::Seconds;
@@ -39,6 +40,8 @@ impl Shutdown {
             // Without a listener signals keep their default: the program ends at once,
             // and the session can be resumed.
             let _ = listener.spawn(move || {
+                // A computer that is busy must not keep a stop waiting.
+                priority::go_first(Urgency::Motor);
                 for signal in signals.forever() {
                     last_resort::stop();
                     match signal {

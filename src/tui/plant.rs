@@ -26,6 +26,7 @@ use crate::backend::safety::warden::Standing;
 use crate::backend::serial::desk::View;
 use crate::backend::serial::shelf::Uncalibrated;
 use crate::backend::serial::standing::{Stage, Stopped};
+use crate::backend::serial::station::Grip;
 use crate::backend::wire::Format;
 use crate::signal::{Seconds, State, wrapped as around};
 
@@ -100,7 +101,10 @@ impl Badge {
             }
             (Standing::Latched(_), _) => ("motor STOPPED: o tells why".to_owned(), Role::Alarm),
             (Standing::Disarmed, _) => ("motor off: o arms it".to_owned(), Role::Strong),
-            (Standing::Armed, Some(switch)) if !look.is_enabled => {
+            (Standing::Armed, Some(_)) if look.grip == Grip::LeftOn => {
+                ("motor ARMED: let go of the switch".to_owned(), Role::Strong)
+            }
+            (Standing::Armed, Some(switch)) if look.grip == Grip::Off => {
                 (format!("motor ARMED: {switch}"), Role::Strong)
             }
             (Standing::Armed, Some(_)) => ("motor ARMED, hand on".to_owned(), Role::Go),
@@ -275,10 +279,13 @@ impl Page<'_> {
 
     /// Whether a hand enables the motor.
     fn hand(&self) -> (String, Role) {
-        match (&self.facts.switch, self.view.look.is_enabled) {
+        match (&self.facts.switch, self.view.look.grip) {
             (None, _) => ("needs to hold nothing".to_owned(), Role::Text),
-            (Some(switch), true) => (format!("ON the switch ({switch})"), Role::Go),
-            (Some(switch), false) => (format!("off the switch ({switch})"), Role::Text),
+            (Some(switch), Grip::On) => (format!("ON the switch ({switch})"), Role::Go),
+            (Some(_), Grip::LeftOn) => {
+                ("ON the switch since before arming: let go".to_owned(), Role::Strong)
+            }
+            (Some(switch), Grip::Off) => (format!("off the switch ({switch})"), Role::Text),
         }
     }
 

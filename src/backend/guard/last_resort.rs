@@ -9,14 +9,22 @@
 //!      └─────────────── was_pulled() ◀───────────────┴──▶ port
 //! ```
 //!
-//! The owner of the port may be writing a command at that very moment. So it asks
-//! [`was_pulled`] after each command as well as before, and stops by its own means.
+//! The owner of the port may be writing a command at that very moment. It says so by
+//! [`writing`], and a stop waits a moment for the end of it: no command comes after a stop, and
+//! a board's buffer holds what came before it. Then the owner stops by its own means as well.
 
 use std::os::fd::OwnedFd;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError, TryLockError};
 
 use super::write_stop;
+use crate::clock::{Clock, WallClock};
+use crate::signal::Seconds;
+
+/// A command takes no longer to be written. Whoever died over it is waited for no longer.
+const LONGEST: Seconds = Seconds(0.001);
+/// How often it is looked whether it is written.
+const LOOK: Seconds = Seconds(0.000_05);
 
 /// The program's one last resort.
 static HERE: LastResort = LastResort::new();
@@ -53,6 +61,22 @@ pub fn was_pulled() -> bool {
     HERE.was_pulled()
 }
 
+/// The owner writes to its port until this is dropped. Whether it may drive it asks after this.
+#[must_use]
+pub fn writing() -> Writing<'static> {
+    HERE.writing()
+}
+
+/// That a command is being written.
+#[derive(Debug)]
+pub struct Writing<'a>(&'a AtomicBool);
+
+impl Drop for Writing<'_> {
+    fn drop(&mut self) {
+        self.0.store(false, Ordering::SeqCst);
+    }
+}
+
 /// A port, and what stops the motor there.
 #[derive(Debug)]
 struct Ready {
@@ -66,6 +90,9 @@ struct LastResort {
     ready: Mutex<Option<Ready>>,
     is_mute: AtomicBool,
     was_pulled: AtomicBool,
+    is_writing: AtomicBool,
+    /// How long a command may take to be written.
+    patience: Seconds,
 }
 
 impl LastResort {
@@ -74,6 +101,8 @@ impl LastResort {
             ready: Mutex::new(None),
             is_mute: AtomicBool::new(false),
             was_pulled: AtomicBool::new(false),
+            is_writing: AtomicBool::new(false),
+            patience: LONGEST,
         }
     }
 
@@ -99,6 +128,19 @@ impl LastResort {
         self.was_pulled.load(Ordering::SeqCst)
     }
 
+    fn writing(&self) -> Writing<'_> {
+        self.is_writing.store(true, Ordering::SeqCst);
+        Writing(&self.is_writing)
+    }
+
+    /// Waits until no command is being written, but not for a writer that failed.
+    fn wait_for_writer(&self) {
+        let mut clock = WallClock::start();
+        while self.is_writing.load(Ordering::SeqCst) && clock.now() < self.patience {
+            clock.wait_until(clock.now() + LOOK);
+        }
+    }
+
     fn stop(&self) -> bool {
         let ready = match self.ready.try_lock() {
             Ok(ready) => ready,
@@ -113,13 +155,14 @@ impl LastResort {
         let Some(ready) = &*ready else { return false };
         // First, so that its owner writes no further command.
         self.was_pulled.store(true, Ordering::SeqCst);
+        self.wait_for_writer();
         !self.is_mute.load(Ordering::SeqCst) && write_stop(&ready.port, &ready.stop).is_ok()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::io::{PipeReader, Read, pipe};
+    use std::io::{PipeReader, Read, Write, pipe};
 
     use super::*;
 
@@ -149,6 +192,34 @@ mod tests {
         let (_, port) = pipe().unwrap();
         resort.arm(port.into(), b"stop");
         assert!(!resort.was_pulled());
+    }
+
+    #[test]
+    fn a_command_that_is_being_written_comes_before_the_stop() {
+        let (heard, mut port) = pipe().unwrap();
+        let resort = LastResort { patience: Seconds(60.0), ..LastResort::new() };
+        resort.arm(port.try_clone().unwrap().into(), b"stop");
+        std::thread::scope(|scope| {
+            let writing = resort.writing();
+            assert!(!resort.was_pulled(), "it may drive");
+            let stop = scope.spawn(|| resort.stop());
+            while !resort.was_pulled() {
+                std::thread::yield_now();
+            }
+            port.write_all(b"drive").unwrap();
+            drop(writing);
+            assert!(stop.join().unwrap());
+        });
+        drop(port);
+        assert_eq!(all(&resort, heard), "drivestop");
+    }
+
+    #[test]
+    fn a_writer_that_never_ends_does_not_keep_the_stop() {
+        let (resort, heard) = armed();
+        let _stuck = resort.writing();
+        assert!(resort.stop());
+        assert_eq!(all(&resort, heard), "stop");
     }
 
     #[test]

@@ -249,7 +249,6 @@ impl Server {
         if answers {
             self.station.answer(self.clock.now());
         }
-        self.heed_last_resort();
         self.flush();
         if answers {
             self.note_latency();
@@ -362,7 +361,12 @@ impl Server {
             // From the order on, not a byte more.
             last_resort::set_mute(true);
         }
-        if let Err(lost) = link.port.write(&output) {
+        let writing = last_resort::writing();
+        let may_drive = !last_resort::was_pulled();
+        let is_armed = self.station.driver().standing() == Standing::Armed;
+        let sent = if may_drive || !is_armed { link.port.write(&output) } else { Ok(()) };
+        drop(writing);
+        if let Err(lost) = sent {
             self.lose(&lost.to_string());
         }
     }

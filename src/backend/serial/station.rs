@@ -10,17 +10,19 @@
 //!                                              └── bytes, time
 //! ```
 
+mod look;
+
 use jiff::Timestamp;
 
 use super::Params;
 use super::calibration::{self, Procedure, Sight};
-use super::centre::{Centre, Pole, Unrest};
-use super::driver::{Driver, NotArmed, Stage, Stopped};
+use super::centre::{Centre, Pole};
+use super::driver::{Driver, NotArmed};
 use super::shelf::{Calibration, Uncalibrated, current};
 use crate::backend::safety::warden::{Fault, Standing, Wanted};
-use crate::backend::wire::Counts;
 use crate::plant::cart_pole;
-use crate::signal::{Seconds, State};
+use crate::signal::Seconds;
+pub use look::{Calibrating, Duty, Grip, Look};
 
 /// What a person, or the control cycle, asks of a station.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,73 +51,6 @@ pub enum Wish {
     Return(Pole),
     /// The motor is to rest.
     Rest,
-}
-
-/// What is known of a calibration under way.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Calibrating {
-    /// How far it is.
-    pub step: calibration::Step,
-    /// How much of the step is done, 0 to 1.
-    pub progress: f64,
-    /// What the person is told or asked.
-    pub prompt: String,
-}
-
-/// What is on.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum Duty {
-    /// Nothing: the motor rests.
-    #[default]
-    Rest,
-    /// The caller drives.
-    Follow,
-    /// The return to the middle.
-    Return {
-        /// Whether all is there.
-        is_there: bool,
-        /// What does not come to rest.
-        trouble: Option<Unrest>,
-    },
-    /// A calibration.
-    Calibrate(Calibrating),
-}
-
-/// All that others may know of a station.
-#[derive(Clone, Debug)]
-pub struct Look {
-    /// The device's lasting name.
-    pub device: String,
-    /// How far the device has come.
-    pub stage: Stage,
-    /// What the guard of the plant allows.
-    pub standing: Standing,
-    /// Whether the motor is known to be off after a stop.
-    pub stopped: Stopped,
-    /// Whether the ends of the track are known.
-    pub is_homed: bool,
-    /// Whether homing takes longer than it can.
-    pub is_stuck: bool,
-    /// When the device was calibrated, or why that does not count.
-    pub calibrated: Result<String, Uncalibrated>,
-    /// What is on.
-    pub duty: Duty,
-    /// Whether a hand is on the switch that enables the motor, or none is needed.
-    pub is_enabled: bool,
-    /// Why the last wish to arm or home was refused.
-    pub refused: Option<NotArmed>,
-    /// The plant's state, and when it came.
-    pub latest: Option<(State, Seconds)>,
-    /// States so far,
-    pub states: u64,
-    /// and the one of them that was answered last,
-    pub answered: u64,
-    /// with this action.
-    pub applied: f64,
-    /// States that the device's own time says are missing.
-    pub lost: u64,
-    /// What became of the bytes.
-    pub counts: Counts,
 }
 
 /// What is on, with its procedure.
@@ -151,6 +86,8 @@ pub struct Station {
     driver: Driver,
     work: Work,
     enabled: Option<Seconds>,
+    /// That hand was there when the motor was armed.
+    must_let_go: bool,
     refused: Option<NotArmed>,
     wanted: Option<(f64, Seconds)>,
     answered: u64,
@@ -174,6 +111,7 @@ impl Station {
             about,
             work: Work::Rest,
             enabled: None,
+            must_let_go: false,
             refused: None,
             wanted: None,
             answered: 0,
@@ -207,6 +145,7 @@ impl Station {
     /// A hand is on the switch at `now`, or is not.
     pub const fn enable(&mut self, is_held: bool, now: Seconds) {
         self.enabled = if is_held { Some(now) } else { None };
+        self.must_let_go &= is_held;
     }
 
     /// The caller wants `action` from `now` on.
@@ -220,7 +159,11 @@ impl Station {
     /// Somebody wishes something.
     pub fn obey(&mut self, wish: Wish, now: Seconds) {
         match wish {
-            Wish::Arm => self.refused = self.arm(now).err(),
+            Wish::Arm => {
+                // Arming alone never moves a cart, whatever the hand was left on.
+                self.must_let_go = self.enabled.is_some();
+                self.refused = self.arm(now).err();
+            }
             Wish::Disarm => {
                 self.rest();
                 self.driver.disarm(now);
@@ -349,7 +292,7 @@ impl Station {
                     prompt: procedure.prompt(),
                 }),
             },
-            is_enabled: self.is_enabled(now),
+            grip: self.grip(now),
             refused: self.refused.or_else(|| self.driver.refused()),
             latest: self.driver.latest(),
             states: self.driver.received().states,
@@ -360,8 +303,17 @@ impl Station {
         }
     }
 
+    fn grip(&self, now: Seconds) -> Grip {
+        let is_held = self.enabled.is_some_and(|at| now - at <= HELD);
+        match (self.params.hold_to_enable, is_held) {
+            (true, false) => Grip::Off,
+            (true, true) if self.must_let_go => Grip::LeftOn,
+            _ => Grip::On,
+        }
+    }
+
     fn is_enabled(&self, now: Seconds) -> bool {
-        !self.params.hold_to_enable || self.enabled.is_some_and(|at| now - at <= HELD)
+        self.grip(now) == Grip::On
     }
 
     /// The calibration that counts.
@@ -503,6 +455,25 @@ mod tests {
         assert_eq!(calibrated(&station), Ok(about().now.to_string()));
         station.date("2026-03-21T10:00:00Z".parse().unwrap());
         assert_eq!(calibrated(&station), Err(Uncalibrated::Stale));
+    }
+
+    #[test]
+    fn a_hand_that_never_let_go_of_the_switch_enables_nothing_after_arming() {
+        let mut station = Station::new(&params(Format::Cobs1), about());
+        let grip = |station: &Station, now| station.look(Seconds(now)).grip;
+        station.enable(true, Seconds(0.0));
+        assert_eq!(grip(&station, 0.0), Grip::On);
+        station.obey(Wish::Arm, Seconds(0.01));
+        station.enable(true, Seconds(0.02));
+        assert_eq!(grip(&station, 0.02), Grip::LeftOn);
+        station.enable(false, Seconds(0.03));
+        assert_eq!(grip(&station, 0.03), Grip::Off);
+        station.enable(true, Seconds(0.04));
+        assert_eq!(grip(&station, 0.04), Grip::On);
+        station.enable(false, Seconds(0.05));
+        station.obey(Wish::Arm, Seconds(0.06));
+        station.enable(true, Seconds(0.07));
+        assert_eq!(grip(&station, 0.07), Grip::On, "the usual way");
     }
 
     #[test]

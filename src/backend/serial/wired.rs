@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::centre::Pole;
 use super::desk::{Ask, Desk, View};
 use super::driver::Stage;
-use super::station::{Duty, Look, Wish};
+use super::station::{Duty, Grip, Look, Wish};
 use crate::backend::safety::Trip;
 use crate::backend::safety::warden::{Fault, Standing};
 use crate::backend::{Backend, Readiness, Sensed};
@@ -138,12 +138,16 @@ impl Backend for Wired {
         if let Some(why) = off(&look) {
             return waits(why, true);
         }
-        if !look.is_enabled && !self.has_switch {
-            return waits(NO_SWITCH.to_owned(), true);
-        }
-        if !look.is_enabled {
-            let switch = switch.unwrap_or_else(|| "hold the switch".to_owned());
-            return waits(format!("{switch} to enable the motor"), true);
+        match look.grip {
+            Grip::On => {}
+            _ if !self.has_switch => return waits(NO_SWITCH.to_owned(), true),
+            Grip::LeftOn => {
+                return waits("let go of the switch that enables the motor".to_owned(), true);
+            }
+            Grip::Off => {
+                let switch = switch.unwrap_or_else(|| "hold the switch".to_owned());
+                return waits(format!("{switch} to enable the motor"), true);
+            }
         }
         match look.duty {
             _ if start.is_none() => Readiness::Ready,

@@ -4,7 +4,7 @@ use super::Page;
 use crate::backend::safety::warden::Standing;
 use crate::backend::serial::calibration::Step;
 use crate::backend::serial::standing::{Stage, Stopped};
-use crate::backend::serial::station::{Calibrating, Duty};
+use crate::backend::serial::station::{Calibrating, Duty, Grip};
 use crate::tui::palette::Role;
 
 /// What to do.
@@ -152,8 +152,11 @@ fn disarmed(page: &Page<'_>) -> Advice {
 /// A motor that may move.
 fn armed(page: &Page<'_>) -> Advice {
     let look = &page.view.look;
-    let switch = page.facts.switch.as_deref().filter(|_| !look.is_enabled);
+    let switch = page.facts.switch.as_deref().filter(|_| look.grip == Grip::Off);
     let advice = match (switch, &look.duty) {
+        _ if look.grip == Grip::LeftOn => {
+            Advice::new(Role::Strong, "Let go of the switch: it counts from then on.")
+        }
         (Some(switch), _) => {
             let hold = capital(switch);
             Advice::new(Role::Strong, format!("{hold}: without it the motor stays off."))
@@ -171,7 +174,9 @@ fn armed(page: &Page<'_>) -> Advice {
             .key("o", "show the scene"),
     };
     match &page.facts.switch {
-        Some(_) if look.is_enabled => advice.and("To let go stops the motor, and so does space."),
+        Some(_) if look.grip == Grip::On => {
+            advice.and("To let go stops the motor, and so does space.")
+        }
         _ => advice.and("Space is the emergency stop; m disarms."),
     }
 }

@@ -82,7 +82,7 @@ fn a_stop_is_safe_after_another_command_and_after_half_of_one() {
     lab.write_while_busy(&all);
     lab.wait(0.05);
     assert_eq!((lab.last().command, lab.crashed()), (0, false));
-    assert_eq!(lab.offences(), [Offence::TooManyBytes], "in one write");
+    assert_eq!(lab.offences(), [], "its buffer holds both, even read at once");
     let mut lab = streaming();
     lab.order(Order::Command(1234), 0.0001);
     lab.order(Order::Stop, 0.05);
