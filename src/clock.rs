@@ -118,6 +118,20 @@ impl Pacer {
     }
 }
 
+/// The processor time that this thread has used; none where the system does not tell.
+#[must_use]
+pub fn processor_time() -> Option<Seconds> {
+    #[cfg(unix)]
+    {
+        let used = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+        #[expect(clippy::cast_precision_loss, reason = "exact for two million years")]
+        let (seconds, nanoseconds) = (used.tv_sec as f64, used.tv_nsec as f64);
+        Some(Seconds(seconds + nanoseconds * 1e-9))
+    }
+    #[cfg(not(unix))]
+    None
+}
+
 /// The date and time of the wall.
 #[must_use]
 pub fn today() -> jiff::Timestamp {

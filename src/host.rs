@@ -215,6 +215,15 @@ fn group_id(_path: &Path) -> Option<u32> {
     None
 }
 
+/// The most memory that this program has used so far, MiB; none where the system does not tell.
+#[must_use]
+pub fn most_memory_mib() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kib: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib / 1024.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -44,6 +44,8 @@ pub struct Feedback<'a> {
     pub share: f64,
     /// Whether the plant ran into the end of its track.
     pub bumped: bool,
+    /// Whether the state's region is handed over for good, and nothing is learned there.
+    pub is_frozen: bool,
 }
 
 /// What a device asks for beside its deflection, with its buttons.
@@ -139,6 +141,12 @@ pub trait Operator: Send {
 
     /// The latest wish; never blocks. Called in the countdown too, where it has no effect.
     fn intent(&mut self, view: View<'_>) -> Intent;
+
+    /// What the robot is given to learn from the tick at which this was `wanted`, before what came
+    /// of it is known: that, unless the operator tries things.
+    fn shown(&self, wanted: Intent) -> Intent {
+        wanted
+    }
 
     /// What eyes and hand remember at a rollout's end, as numbers of the operator's own.
     /// Empty for one that lives in the present.

@@ -15,6 +15,7 @@ mod report;
 mod scan;
 pub mod settings;
 mod show;
+mod text;
 
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +30,7 @@ pub use library::{Listed, ProfileError, list};
 pub use order::Order;
 pub use report::{Fault, Report};
 pub use show::show;
+pub use text::{Text, Wrong};
 
 /// The mode that a person asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -20,15 +20,18 @@ mod names;
 pub mod policy;
 pub mod reader;
 pub mod sidecar;
+mod steps;
 mod table;
 pub mod writer;
 
 pub use checkpoint::{Checkpoint, Momentum, Resumed};
+pub use document::{Document, read as read_document, write as write_document};
 pub use error::Error;
 pub use evaluation::EvaluationRow;
 pub use folder::Folder;
 pub use policy::{Policy, policy_text, read_policy};
 pub use sidecar::{Sidecar, Status, read_sidecar};
+pub use steps::StepFile;
 pub use writer::{Columns, Manner, Recorder};
 
 use serde::de::DeserializeOwned;

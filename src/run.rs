@@ -17,6 +17,7 @@ mod plant;
 mod screen;
 pub mod session;
 mod shutdown;
+mod study;
 mod words;
 
 use std::io::{self, IsTerminal, Write};
@@ -80,6 +81,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Run(run)) => screen::screen(Some(run)),
         Some(Command::Evaluate(words)) => evaluate::evaluate(words),
         Some(Command::Fit(words)) => fit::fit(words),
+        Some(Command::Study(words)) => study::study(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::PadRelay(words)) => pad_relay::pad_relay(words),
         #[cfg(unix)]

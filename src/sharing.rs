@@ -51,6 +51,13 @@ pub fn mix(share: f64, human: f64, machine: f64) -> f64 {
     }
 }
 
+/// The nearest to `action` of full effort back, none and full effort ahead, where the largest
+/// action is `limit`; halves count as none.
+#[must_use]
+pub fn rounded(action: f64, limit: f64) -> f64 {
+    if action.abs() > limit / 2.0 { limit.copysign(action) } else { 0.0 }
+}
+
 /// What stays as it is once a region is handed over (3.1.5: "freezing the learning for
 /// regions that attain high level autonomy").
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -88,8 +95,13 @@ pub struct Params {
     pub tau_floor_episodes: f64,
     /// What stays as it is once a region is handed over,
     pub freeze: Freeze,
-    /// which it is when its share is below this and its window is full.
+    /// which it is when its share is below this, its window is full,
     pub freeze_share: f64,
+    /// and its success is at least this.
+    pub freeze_success: f64,
+    /// Whether the mixed action is made the nearest of fully back, none and fully ahead, the
+    /// only ones that an agent knows.
+    pub round_mix: bool,
 }
 
 impl Default for Params {
@@ -105,6 +117,8 @@ impl Default for Params {
             tau_floor_episodes: 1.0,
             freeze: Freeze::Off,
             freeze_share: 0.05,
+            freeze_success: 0.0,
+            round_mix: false,
         }
     }
 }
@@ -146,6 +160,7 @@ impl Check for Params {
         c.range("tau_floor_steps", self.tau_floor_steps, TAU);
         c.range("tau_floor_episodes", self.tau_floor_episodes, TAU);
         c.range("freeze_share", self.freeze_share, 0.0..=0.99);
+        c.range("freeze_success", self.freeze_success, 0.0..=1.0);
     }
 }
 
@@ -217,7 +232,7 @@ impl Sharing {
         // Who only watches is handed nothing.
         let froze = self.mode == Mode::Simultaneous
             && here.window.is_full()
-            && here.weight.freeze(&self.dynamics);
+            && here.weight.freeze(success, &self.dynamics);
         Observed { success, gate_opened, froze }
     }
 
@@ -232,6 +247,14 @@ impl Sharing {
     #[must_use]
     pub fn is_learner_frozen(&self, region: usize) -> bool {
         self.dynamics.freezes_learner() && self.is_frozen(region)
+    }
+
+    /// Whether what happens in `region` teaches the robot: not once it is handed over, where that
+    /// freezes the learner, and with `from_gate` not before its gate has opened.
+    #[must_use]
+    pub fn teaches(&self, region: usize, from_gate: bool) -> bool {
+        let waits = from_gate && self.gate(region).is_none();
+        !waits && !self.is_learner_frozen(region)
     }
 
     /// The step, or episode, at which `region`'s gate opened and the time constant found
@@ -285,6 +308,28 @@ mod tests {
         assert_eq!(opened.step, 54);
         assert!((opened.tau - tau.unwrap()).abs() < 1e-12);
         assert!(s.share(0) < 0.3);
+    }
+
+    #[test]
+    fn learning_may_wait_for_the_gate() {
+        for mode in [Mode::Simultaneous, Mode::Sequential] {
+            let mut s = sharing(mode, 10);
+            let taught: Vec<(bool, bool)> = (0..6)
+                .map(|_| {
+                    s.observe(0, 1.0);
+                    (s.teaches(0, true), s.teaches(0, false))
+                })
+                .collect();
+            // Success is 0.4 at the fourth.
+            let waits = |taught| (taught, true);
+            assert_eq!(taught, [false, false, false, true, true, true].map(waits));
+        }
+    }
+
+    #[test]
+    fn a_rounded_action_is_full_or_none() {
+        let actions = [-3.0, -2.1, -2.0, 0.0, 1.9, 2.1].map(|action| rounded(action, 4.0));
+        assert_eq!(actions, [-4.0, -4.0, 0.0, 0.0, 0.0, 4.0]);
     }
 
     #[test]
@@ -349,6 +394,26 @@ mod tests {
             assert_eq!(s.is_frozen(0), freeze != Freeze::Off);
             assert_eq!(s.is_learner_frozen(0), freeze == Freeze::ShareAndLearner);
         }
+    }
+
+    #[test]
+    fn a_region_may_be_handed_over_at_a_success_only() {
+        let params = Params {
+            window_steps: 10,
+            tau_steps: Some(2.0),
+            gate: 0.0,
+            freeze: Freeze::Share,
+            freeze_share: 0.5,
+            freeze_success: 1.0,
+            ..Params::default()
+        };
+        let mut s = Sharing::new(&params, Mode::Simultaneous, &WHOLE);
+        for _ in 0..100 {
+            assert!(!s.observe(0, 0.9).froze);
+        }
+        assert!(s.share(0) < 0.2);
+        let froze: Vec<u32> = (1..=20).filter(|_| s.observe(0, 1.0).froze).collect();
+        assert_eq!(froze, [10]);
     }
 
     #[test]

@@ -59,6 +59,8 @@ pub struct Params {
     pub outcome_least: f64,
     /// and the most.
     pub outcome_most: f64,
+    /// Whether nothing is learned before the gate of `sharing` opens (4.3).
+    pub from_gate: bool,
 }
 
 impl Default for Params {
@@ -71,6 +73,7 @@ impl Default for Params {
             outcome_scale: 0.02,
             outcome_least: 0.02,
             outcome_most: 3.0,
+            from_gate: false,
         }
     }
 }

@@ -207,7 +207,7 @@ const RESERVED: [(&str, &[&str]); 7] = [
     ("ratatui::", &["tui"]),
     ("crossterm::", &["tui", "operator/terminal"]),
     ("gilrs::", &["operator/gamepad"]),
-    ("indicatif::", &["run/fit/progress"]),
+    ("indicatif::", &["run/fit/progress", "run/study/progress"]),
     ("serialport::", &["backend/serial", "backend/emulator"]),
     ("Instant::now", &["clock"]),
     ("SystemTime::now", &["clock"]),

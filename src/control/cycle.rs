@@ -8,7 +8,7 @@ use hdrhistogram::Histogram;
 use super::effects;
 use super::rollout::{Before, Mind, Rollout, WentOn};
 use super::snapshot::{Command, MOST_REGIONS, Publisher, Snapshot};
-use super::witness::{Standing, Witness};
+use super::witness::{Needs, Standing, Witness};
 use crate::backend::safety::Safe;
 use crate::backend::{Backend, Sensed};
 use crate::clock::{Clock, Pacer, Wake};
@@ -18,7 +18,7 @@ use crate::record::{EpisodeRow, StepRow};
 use crate::session::machine::{self, Event, Finish, Stage};
 use crate::session::plan::Plan;
 use crate::session::{Moment, Phase};
-use crate::sharing::{self, Mode, Sharing, mix};
+use crate::sharing::{self, Mode, Sharing};
 use crate::signal::{Action, End, Intent, Seconds, State, Tick};
 use crate::task::{Occasion, Task};
 use crate::teaching::{self, Sight, Teacher};
@@ -103,6 +103,10 @@ pub struct Cycle<W> {
     pub(super) seen: Snapshot,
     wanted_speed: f64,
     lateness_us: Option<Histogram<u64>>,
+    /// Who drives in the learner's place where the robot is alone.
+    pub(super) deputy: Option<Box<dyn Operator>>,
+    /// What the witness wants.
+    pub(super) needs: Needs,
 }
 
 impl<W: Witness> Cycle<W> {
@@ -120,6 +124,7 @@ impl<W: Witness> Cycle<W> {
         let moment = from.as_ref().map(|(standing, _)| standing.moment);
         let goes_on = from.as_ref().is_some_and(|(standing, _)| standing.momentum.is_some());
         let (stage, effects) = machine::begin(&rules.plan, moment, goes_on);
+        let needs = crew.witness.needs();
         let names: Vec<&str> = crew.task.regions().iter().map(|region| region.name).collect();
         let teacher = Teacher::new(&rules.teaching, rules.tick, &names);
         let mut cycle = Self {
@@ -140,6 +145,8 @@ impl<W: Witness> Cycle<W> {
             seen: Snapshot::before(stage),
             wanted_speed: 1.0,
             lateness_us: Histogram::new_with_max(60_000_000, 3).ok(),
+            deputy: None,
+            needs,
         };
         let is_new = from.is_none();
         if let Some((standing, earlier)) = from {
@@ -153,6 +160,25 @@ impl<W: Witness> Cycle<W> {
         }
         cycle.publish();
         cycle
+    }
+
+    /// The same, but where the robot is alone `deputy` drives: another policy, or the learner's
+    /// read in another way. It is asked at each tick and told nothing.
+    #[must_use]
+    pub fn with_deputy(mut self, deputy: Box<dyn Operator>) -> Self {
+        self.deputy = Some(deputy);
+        self
+    }
+
+    /// Who steers.
+    #[must_use]
+    pub fn operator(&self) -> &dyn Operator {
+        &*self.crew.operator
+    }
+
+    /// Who writes it down.
+    pub const fn witness(&mut self) -> &mut W {
+        &mut self.crew.witness
     }
 
     fn recall(&mut self, standing: Standing) {
@@ -237,10 +263,10 @@ impl<W: Witness> Cycle<W> {
             Intent::Absent
         };
         let features = self.crew.task.features(&state);
-        let machine = self.predict(moment.phase, &features);
         let share = self.share(moment.phase, region);
+        let machine = self.machine(moment, share, &state, &features);
         let wanted = match (share, machine) {
-            (Some(share), machine) => mix(share, human.action().0, machine.unwrap_or(0.0)),
+            (Some(share), machine) => self.mixed(share, human.action().0, machine.unwrap_or(0.0)),
             (None, _) => 0.0,
         };
         let applied = self.crew.backend.actuate(Action(wanted)).0;
@@ -249,16 +275,17 @@ impl<W: Witness> Cycle<W> {
         let Sensed { state: next, .. } = self.crew.backend.sense();
         let reward = self.crew.task.reward(&state, &next);
         let end = self.crew.task.end(&next, moment.step + 1, occasion(moment.phase));
+        let is_main = moment.phase == Phase::Main;
         let mut success = None;
-        if moment.phase == Phase::Main {
+        if is_main {
             success = Some(self.observe(moment, region, self.crew.task.measure(&state, reward)));
             self.teach(Sight {
                 features,
                 region,
-                cost: self.crew.task.cost(&state),
-                human,
+                cost: self.cost(&state),
+                human: self.crew.operator.shown(human),
                 applied,
-                teaches: !self.mind.sharing.is_learner_frozen(region),
+                teaches: self.mind.sharing.teaches(region, self.rules.teaching.from_gate),
             });
         }
         if moment.phase.is_steered() {
@@ -271,29 +298,32 @@ impl<W: Witness> Cycle<W> {
                 end,
                 share: share.unwrap_or(1.0),
                 bumped: self.crew.task.bumped(&state, &next),
+                is_frozen: is_main && self.mind.sharing.is_learner_frozen(region),
             });
         }
         self.rollout.total_reward += reward;
         self.rollout.tally.step(&state, &next);
-        let row = StepRow {
-            phase: moment.phase,
-            episode: moment.rollout,
-            step: moment.step,
-            t: f64::from(moment.step) * self.rules.tick.0,
-            state,
-            u_human: human.is_present().then_some(human.action().0),
-            u_machine: machine,
-            share,
-            u: Some(wanted),
-            u_applied: Some(applied),
-            reward: Some(reward),
-            success,
-            region: self.crew.task.regions().get(region).map(|r| r.name),
-            lateness_us: micros(self.seen.lateness),
-            raw: human.raw().filter(|raw| raw.is_finite()),
-        };
-        self.crew.witness.step(&row);
-        self.see(&row, human, region);
+        if self.is_seen() {
+            let row = StepRow {
+                phase: moment.phase,
+                episode: moment.rollout,
+                step: moment.step,
+                t: f64::from(moment.step) * self.rules.tick.0,
+                state,
+                u_human: human.is_present().then_some(human.action().0),
+                u_machine: machine,
+                share,
+                u: Some(wanted),
+                u_applied: Some(applied),
+                reward: Some(reward),
+                success,
+                region: self.crew.task.regions().get(region).map(|r| r.name),
+                lateness_us: micros(self.seen.lateness),
+                raw: human.raw().filter(|raw| raw.is_finite()),
+            };
+            self.crew.witness.step(&row);
+            self.see(&row, human, region);
+        }
         end
     }
 
@@ -329,15 +359,6 @@ impl<W: Witness> Cycle<W> {
             }
             Intent::Absent => Intent::Absent,
         }
-    }
-
-    /// What the learner would do, where it is asked.
-    fn predict(&self, phase: Phase, features: &[f64]) -> Option<f64> {
-        matches!(phase, Phase::Main | Phase::Autonomous).then(|| {
-            let mut action = [0.0];
-            self.mind.learner.predict(features, &mut action);
-            action[0]
-        })
     }
 
     /// The person's share; none where nobody steers at all.

@@ -33,6 +33,7 @@ impl<W: Witness> Cycle<W> {
         self.carry_out(&effects);
         if let Stage::Running(moment) = self.stage
             && event == Event::Tick(None)
+            && self.rules.plan.phase(moment.phase).is_some_and(|phase| phase.steps.is_some())
         {
             self.store_tenths(moment, moment.rollout - 1);
         }
@@ -186,7 +187,10 @@ impl<W: Witness> Cycle<W> {
         if let Some(publisher) = &self.crew.publisher {
             publisher.rollout(row);
         }
-        self.episodes.push(row);
+        // A scale of success may go by what was practised.
+        if self.needs.rollouts || moment.phase == Phase::Introduction {
+            self.episodes.push(row);
+        }
         if !is_kept {
             return;
         }
@@ -270,7 +274,7 @@ impl<W: Witness> Cycle<W> {
     /// Stores where a cut session would go on. The learner is left out once it is frozen:
     /// it is the final policy then.
     pub(super) fn store_standing(&mut self) {
-        let Some(moment) = self.stage.moment() else { return };
+        let Some(moment) = self.stage.moment().filter(|_| self.needs.standings) else { return };
         let learns = moment.phase.is_steered();
         self.crew.witness.standing(Standing {
             moment,

@@ -3,12 +3,61 @@
 use super::cycle::Cycle;
 use super::witness::{Happening, Witness};
 use crate::learner::Learner;
-use crate::session::Moment;
+use crate::operator::View;
+use crate::session::{Moment, Phase};
 use crate::sharing::weight::Opened;
-use crate::signal::{End, State};
+use crate::sharing::{self, mix};
+use crate::signal::{End, Seconds, State};
 use crate::teaching::{Lesson, Sight};
 
 impl<W: Witness> Cycle<W> {
+    /// What the robot would do in `state`, where that is asked for.
+    pub(super) fn machine(
+        &mut self,
+        moment: Moment,
+        share: Option<f64>,
+        state: &State,
+        features: &[f64],
+    ) -> Option<f64> {
+        let is_idle = share.is_none_or(|share| share >= 1.0);
+        let is_seen = self.is_seen();
+        match (moment.phase, &mut self.deputy) {
+            (Phase::Autonomous, Some(deputy)) => {
+                let rollout_time = Seconds(f64::from(moment.step) * self.rules.tick.0);
+                let view = View { state, now: rollout_time, rollout_time };
+                Some(deputy.intent(view).action().0)
+            }
+            // It has no effect, and nobody looks at it.
+            (Phase::Main, _) if is_idle && !is_seen => None,
+            (Phase::Main | Phase::Autonomous, _) => {
+                let mut action = [0.0];
+                self.mind.learner.predict(features, &mut action);
+                Some(action[0])
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether anybody looks at single steps.
+    pub(super) fn is_seen(&self) -> bool {
+        self.needs.steps || self.crew.publisher.is_some()
+    }
+
+    /// The cost of `state`, where lessons weigh by it.
+    pub(super) fn cost(&self, state: &State) -> f64 {
+        if self.rules.teaching.outcome_s.is_some() { self.crew.task.cost(state) } else { 0.0 }
+    }
+
+    /// The action of both.
+    pub(super) fn mixed(&self, share: f64, human: f64, machine: f64) -> f64 {
+        let action = mix(share, human, machine);
+        if self.rules.sharing.round_mix && share > 0.0 && share < 1.0 {
+            sharing::rounded(action, self.crew.task.action_limit())
+        } else {
+            action
+        }
+    }
+
     /// Lets the share move by the measure of a step, where it moves each step; returns the
     /// success.
     pub(super) fn observe(&mut self, moment: Moment, region: usize, measure: f64) -> f64 {

@@ -41,8 +41,28 @@ pub struct Happening {
     pub cause: String,
 }
 
+/// What a witness wants of a session; the rest may be left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needs {
+    /// Whole step rows, with what the robot would have done where it has no part.
+    pub steps: bool,
+    /// Where a cut session would go on, after every rollout: copies of all that is learned.
+    pub standings: bool,
+    /// The outcome's list of all rollouts.
+    pub rollouts: bool,
+}
+
+impl Needs {
+    /// All of it.
+    pub const ALL: Self = Self { steps: true, standings: true, rollouts: true };
+}
+
 /// Writes down what the cycle does. Nothing here may block a live tick.
 pub trait Witness: Send {
+    /// What it wants; asked once, before the session.
+    fn needs(&self) -> Needs {
+        Needs::ALL
+    }
     /// Whether a full queue may hold up the cycle from now on: not while it keeps pace with
     /// a person or a device.
     fn allow_waiting(&mut self, may_wait: bool);
@@ -67,6 +87,9 @@ pub trait Witness: Send {
 pub struct Nobody;
 
 impl Witness for Nobody {
+    fn needs(&self) -> Needs {
+        Needs { steps: false, standings: false, rollouts: true }
+    }
     fn allow_waiting(&mut self, _may_wait: bool) {}
     fn step(&mut self, _row: &StepRow) {}
     fn episode(&mut self, _row: &EpisodeRow) {}

@@ -34,7 +34,7 @@ mod traces;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-pub use params::{Params, Updates};
+pub use params::{Params, Shows, Updates};
 pub use table::{Cell, Throttle};
 
 use super::{Feedback, Operator, Practice, View};
@@ -139,6 +139,8 @@ pub struct QLearner {
     /// What it wants in which cell, until it is told what came of it: a countdown asks often,
     /// and chance must not depend on that.
     decided: Option<(Cell, Throttle)>,
+    /// The state that it was told of last, and its cell: it is mostly the one that comes next.
+    reached: Option<(State, Cell)>,
 }
 
 impl QLearner {
@@ -152,6 +154,15 @@ impl QLearner {
             chance: stream(seed, Purpose::Exploration, Place::default()),
             throttle_limit: plant.throttle_limit,
             decided: None,
+            reached: None,
+        }
+    }
+
+    /// The cell of `state`.
+    fn cell(&self, state: &State) -> Cell {
+        match &self.reached {
+            Some((reached, cell)) if reached == state => *cell,
+            _ => self.agent.cell(state),
         }
     }
 
@@ -178,7 +189,7 @@ impl Operator for QLearner {
     }
 
     fn intent(&mut self, view: View<'_>) -> Intent {
-        let cell = self.agent.cell(view.state);
+        let cell = self.cell(view.state);
         let throttle = match self.decided {
             Some((decided_in, throttle)) if decided_in == cell => throttle,
             _ => self.agent.choose(cell, &mut self.chance),
@@ -187,14 +198,24 @@ impl Operator for QLearner {
         Intent::fresh(throttle.part() * self.throttle_limit)
     }
 
+    fn shown(&self, wanted: Intent) -> Intent {
+        match (self.agent.params.shows, self.decided) {
+            (Shows::Best, Some((cell, _))) => {
+                Intent::fresh(self.agent.best(cell).part() * self.throttle_limit)
+            }
+            _ => wanted,
+        }
+    }
+
     fn told(&mut self, feedback: &Feedback<'_>) {
         let Some((cell, own)) = self.decided.take() else { return };
-        if !feedback.next.is_finite() {
+        if feedback.is_frozen || !feedback.next.is_finite() {
             return;
         }
         let throttle = self.learned_throttle(own, feedback);
         let is_over = feedback.end == Some(End::Goal);
         let next = (!is_over).then(|| self.agent.cell(feedback.next));
+        self.reached = next.map(|cell| (*feedback.next, cell));
         self.agent.learn(cell, throttle, feedback.reward, next);
     }
 

@@ -68,6 +68,23 @@ impl MountainCar {
     pub const fn new(params: Params) -> Self {
         Self { params }
     }
+
+    /// What the slope at `x` takes from v in a step.
+    #[must_use]
+    pub fn pull(&self, x: f64) -> f64 {
+        self.params.gravity * (3.0 * x).cos()
+    }
+
+    /// A step from position `x`, where the slope's pull is `pull`, and velocity `v` with the
+    /// throttle `u`.
+    #[must_use]
+    pub fn roll(&self, pull: f64, x: f64, v: f64, u: f64) -> (f64, f64) {
+        let p = &self.params;
+        let v = v + p.power * u - pull;
+        let v = v.clamp(-p.speed_limit, p.speed_limit);
+        let x = x + v;
+        if x <= p.left_wall { (p.left_wall, 0.0) } else { (x.min(p.goal), v) }
+    }
 }
 
 impl Plant for MountainCar {
@@ -77,14 +94,8 @@ impl Plant for MountainCar {
 
     fn step(&mut self, state: &State, action: Action) -> State {
         let &[x, v] = &state[..] else { return *state };
-        let p = &self.params;
-        let v = v + p.power * action.0 - p.gravity * (3.0 * x).cos();
-        let v = v.clamp(-p.speed_limit, p.speed_limit);
-        let x = x + v;
-        if x <= p.left_wall {
-            return State::new([p.left_wall, 0.0]);
-        }
-        State::new([x.min(p.goal), v])
+        let (x, v) = self.roll(self.pull(x), x, v, action.0);
+        State::new([x, v])
     }
 
     /// Nothing: the mountain car has no noise.

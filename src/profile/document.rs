@@ -140,6 +140,18 @@ impl Document {
         }
     }
 
+    /// Makes all the changes of `sets`. A number of rollouts stands in place of the profile's
+    /// duration.
+    pub fn change<'a>(&mut self, sets: impl IntoIterator<Item = (&'a str, &'a str)>) {
+        for (key, value) in sets {
+            self.set(key, value);
+        }
+        let is_set = |key: &str| self.sets.iter().any(|set| set.key == key);
+        if is_set("session.main_rollouts") && !is_set("session.main_duration_s") {
+            self.set("session.main_duration_s", "None");
+        }
+    }
+
     /// Takes back the change of `key`, if there is one.
     pub fn unset(&mut self, key: &str) {
         self.sets.retain(|set| set.key != key);

@@ -38,6 +38,18 @@ pub enum ProfileError {
         /// The names of all profiles.
         known: String,
     },
+    /// Another kind of text, which neither a folder nor the program has.
+    #[error("there is no {what} `{name}`{hint}; the known ones are {known}, or give a path")]
+    Stranger {
+        /// What it should be.
+        what: &'static str,
+        /// As asked for.
+        name: String,
+        /// `: did you mean …?`, or nothing.
+        hint: String,
+        /// The names of all that are built in.
+        known: String,
+    },
     /// The path leads to a folder.
     #[error("{} is a folder, not a profile; name a file in it, such as {}", path.display(), path.join("balance.ron").display())]
     Folder {

@@ -387,7 +387,7 @@ fn broken_fault(source: &str, broken: scan::Broken) -> Fault {
 }
 
 /// A fault of the text that no single value is to blame for.
-fn unreadable(source: &str, error: &ron::error::SpannedError) -> Fault {
+pub(super) fn unreadable(source: &str, error: &ron::error::SpannedError) -> Fault {
     let line = error.span.end.line;
     let start: usize = source.split_inclusive('\n').take(line - 1).map(str::len).sum();
     let rest = source.get(start..).unwrap_or_default();

@@ -14,7 +14,7 @@ use super::{Error, finite, layout};
 const SCHEMA: u32 = 1;
 
 /// What one of this program's JSON files holds.
-pub(super) trait Document {
+pub trait Document {
     /// The word that tells the kinds of files apart.
     const KIND: &'static str;
     /// Whether people are expected to read it.
@@ -57,7 +57,7 @@ pub(super) fn text<T: Document + Serialize>(path: &Path, document: &T) -> Result
 /// # Errors
 /// When the document holds a number that is not finite, or the disk refuses; the old file
 /// is then untouched.
-pub(super) fn write<T: Document + Serialize>(
+pub fn write<T: Document + Serialize>(
     path: &Path,
     document: &T,
     durable: bool,
@@ -104,7 +104,7 @@ pub(super) fn sync(path: &Path) -> Result<(), Error> {
 /// # Errors
 /// When the file is missing, is not JSON, is cut off, is another program's or another kind
 /// of file, has a newer form or holds a wrong value: each with its own message.
-pub(super) fn read<T: Document + DeserializeOwned>(path: &Path) -> Result<T, Error> {
+pub fn read<T: Document + DeserializeOwned>(path: &Path) -> Result<T, Error> {
     let text = fs::read_to_string(path).map_err(Error::io("read", path))?;
     let kind = T::KIND;
     let stamp: Stamp = serde_json::from_str(&text).map_err(|e| misread(path, kind, &e))?;

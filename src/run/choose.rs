@@ -14,16 +14,15 @@ use crate::operator::gamepad::link::Link;
 use crate::operator::gamepad::{self, Gamepad, Source};
 use crate::operator::mouse::Mouse;
 use crate::operator::script::{Recorded, Script};
-use crate::operator::simulated::{self, Kind, Skill};
 use crate::operator::terminal::Keyboard;
 use crate::operator::{self, Choice, Operator, Via};
-use crate::profile::{Experiment, Order, Profile};
+use crate::profile::{Order, Profile};
 use crate::random::{Place, Purpose, stream};
 use crate::record::{self, assignment, folder, policy, reader};
 use crate::session::plan::Wanted;
 use crate::session::{Moment, Phase};
 use crate::sharing::Mode;
-use crate::signal::Seconds;
+use crate::study::batch;
 
 /// The policy that the order asks for, read and fitting.
 pub(super) fn order_policy(
@@ -144,8 +143,7 @@ pub(super) fn steer(
             Script::load(file, &phases, limit).map_err(|error| usage(&error))?.into()
         }
         Choice::Simulated(skill, kind) => {
-            let operator = simulated_operator(&profile.experiment, (*skill, *kind), seed, tick);
-            Hand { operator, device: None }
+            Hand { operator: batch::person(profile, (*skill, *kind), seed), device: None }
         }
         Choice::QLearning => profile.experiment.agent(seed).map_err(|e| usage(&e))?.into(),
         Choice::Gamepad(via) => {
@@ -254,27 +252,4 @@ fn recorded(folder: &Path, profile: &Profile, limit: f64) -> Result<Script, RunE
         }
     }
     Ok(Script::recorded(rows, limit))
-}
-
-/// A person who is not there, at the plant of `experiment`.
-fn simulated_operator(
-    experiment: &Experiment,
-    (skill, kind): (Skill, Kind),
-    seed: u64,
-    tick: Seconds,
-) -> Box<dyn Operator> {
-    match experiment {
-        Experiment::Balance { plant, simulated: params, .. } => {
-            Box::new(simulated::cart_pole::Balancer::new(params, skill, kind, seed, tick, plant))
-        }
-        Experiment::SwingUp { plant, simulated: params, .. } => {
-            Box::new(simulated::swing_up::Swinger::new(params, skill, kind, seed, tick, plant))
-        }
-        Experiment::SpeedUp { plant, simulated: params, .. } => {
-            Box::new(simulated::ball_beam::Roller::new(params, skill, kind, seed, tick, plant))
-        }
-        Experiment::MountainCar { plant, simulated: params, .. } => {
-            Box::new(simulated::mountain_car::Driver::new(params, skill, kind, seed, tick, plant))
-        }
-    }
 }

@@ -101,14 +101,7 @@ impl Company {
 pub fn profile_of(order: &Order) -> Result<Profile, RunError> {
     let mut document = Document::find(&order.profile, Path::new("profiles"))
         .map_err(|error| RunError::Usage(error.to_string()))?;
-    for (key, value) in &order.sets {
-        document.set(key, value);
-    }
-    let is_set = |key: &str| order.sets.iter().any(|(set, _)| set == key);
-    // A number of rollouts stands in place of the profile's duration.
-    if is_set("session.main_rollouts") && !is_set("session.main_duration_s") {
-        document.set("session.main_duration_s", "None");
-    }
+    document.change(order.sets.iter().map(|(key, value)| (key.as_str(), value.as_str())));
     document.read().map_err(|report| RunError::Usage(report.render(super::wants_colour())))
 }
 

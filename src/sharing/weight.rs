@@ -13,6 +13,8 @@ pub struct Dynamics {
     tau_floor: f64,
     freeze: Freeze,
     freeze_share: f64,
+    #[serde(default)]
+    freeze_success: f64,
 }
 
 impl Dynamics {
@@ -29,6 +31,7 @@ impl Dynamics {
             tau_floor,
             freeze: params.freeze,
             freeze_share: params.freeze_share,
+            freeze_success: params.freeze_success,
         }
     }
 
@@ -111,10 +114,12 @@ impl Weight {
         self.frozen
     }
 
-    /// Freezes the share once it is low enough, where `dynamics` say so; true when that
-    /// happens. To be asked only with a full window, or an early success would decide.
-    pub fn freeze(&mut self, dynamics: &Dynamics) -> bool {
-        let is_due = dynamics.freeze != Freeze::Off && self.share < dynamics.freeze_share;
+    /// Freezes the share once it is low enough and `success` high enough, where `dynamics` say
+    /// so; true when that happens. To be asked only with a full window, or an early success would decide.
+    pub fn freeze(&mut self, success: f64, dynamics: &Dynamics) -> bool {
+        let is_due = dynamics.freeze != Freeze::Off
+            && self.share < dynamics.freeze_share
+            && success >= dynamics.freeze_success;
         let happens = is_due && !self.frozen;
         self.frozen |= is_due;
         happens

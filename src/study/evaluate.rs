@@ -3,10 +3,10 @@
 use crate::backend::safety::{Limits, Safe};
 use crate::backend::simulated::Simulated;
 use crate::clock::{Pacer, VirtualClock};
-use crate::control::cycle::{Crew, Cycle, Rules};
-use crate::control::witness;
+use crate::control::cycle::{Crew, Cycle, Outcome, Rules};
+use crate::control::witness::{self, Witness};
 use crate::learner::Model;
-use crate::operator;
+use crate::operator::{self, Operator};
 use crate::profile::Profile;
 use crate::record::EpisodeRow;
 use crate::session::Phase;
@@ -53,6 +53,29 @@ fn alone(
     phases: &[Phase],
     is_enough: impl Fn() -> bool,
 ) -> Option<Vec<EpisodeRow>> {
+    let driver = Driver { learner: learner.clone(), deputy: None };
+    let outcome = driven(profile, driver, seed, phases, witness::Nobody, is_enough)?;
+    Some(outcome.episodes)
+}
+
+/// Who drives where the robot is alone.
+pub(super) struct Driver {
+    /// The learner,
+    pub(super) learner: Model,
+    /// or who takes its place.
+    pub(super) deputy: Option<Box<dyn Operator>>,
+}
+
+/// The rollouts of some of the phases that nobody steers, which `witness` writes down; none when
+/// `is_enough` says so in between.
+pub(super) fn driven<W: Witness>(
+    profile: &Profile,
+    driver: Driver,
+    seed: u64,
+    phases: &[Phase],
+    witness: W,
+    is_enough: impl Fn() -> bool,
+) -> Option<Outcome<W>> {
     let tick = profile.tick();
     let mut session = profile.session.clone();
     session.phases = vec![Wanted::Autonomous];
@@ -65,16 +88,19 @@ fn alone(
         mode: Mode::Simultaneous,
         sharing: profile.sharing.clone(),
         teaching: profile.teaching.clone(),
-        fresh: learner.clone(),
+        fresh: driver.learner.clone(),
     };
     let crew = Crew {
         task: profile.experiment.task(tick),
         backend: simulated_backend(profile, seed),
         operator: Box::new(operator::Nobody),
-        witness: witness::Nobody,
+        witness,
         publisher: None,
     };
-    let mut cycle = Cycle::new(rules, crew, learner.clone(), None);
+    let mut cycle = Cycle::new(rules, crew, driver.learner, None);
+    if let Some(deputy) = driver.deputy {
+        cycle = cycle.with_deputy(deputy);
+    }
     let mut clock = VirtualClock::default();
     let mut pacer = Pacer::new(&clock);
     while cycle.step(&mut clock, &mut pacer) {
@@ -82,5 +108,5 @@ fn alone(
             return None;
         }
     }
-    Some(cycle.run(&mut clock).episodes)
+    Some(cycle.run(&mut clock))
 }

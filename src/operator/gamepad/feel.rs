@@ -93,7 +93,16 @@ mod tests {
         let state = State::default();
         let applied = Action(0.0);
         let (state, next) = (&state, &state);
-        touch.told(&Feedback { state, applied, reward: 0.0, next, end, share, bumped })
+        touch.told(&Feedback {
+            state,
+            applied,
+            reward: 0.0,
+            next,
+            end,
+            share,
+            bumped,
+            is_frozen: false,
+        })
     }
 
     #[test]

@@ -30,6 +30,8 @@ pub struct Params {
     pub lambda: Option<f64>,
     /// Whose value a step moves where control is shared.
     pub updates: Updates,
+    /// What the robot is given to learn.
+    pub shows: Shows,
 }
 
 /// The throttle whose value a step moves.
@@ -41,6 +43,17 @@ pub enum Updates {
     Own,
     /// What the plant received, or the nearest to it that the agent knows.
     Executed,
+}
+
+/// What an agent shows the robot that learns from it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shows {
+    /// What it does, tries included.
+    #[default]
+    Tried,
+    /// What it takes for the best (eq. 34), whatever it tries.
+    Best,
 }
 
 impl Default for Params {
@@ -56,6 +69,7 @@ impl Default for Params {
             q_initial: 0.0,
             lambda: None,
             updates: Updates::default(),
+            shows: Shows::default(),
         }
     }
 }

@@ -27,6 +27,7 @@ fn tell(learner: &mut QLearner, state: &State, applied: f64, next: &State, end: 
         end,
         share: 1.0,
         bumped: false,
+        is_frozen: false,
     });
 }
 
@@ -96,6 +97,41 @@ fn looking_often_changes_nothing() {
         wish(&mut often, &state);
     }
     assert_eq!(drive(&mut once, 1000), drive(&mut often, 1000));
+}
+
+#[test]
+fn the_robot_is_shown_tries_or_what_is_best() {
+    let params = Params { epsilon: 1.0, beta_scale: 0.0, ..Params::default() };
+    let mut tries = learner(&params);
+    let mut best = learner(&Params { shows: Shows::Best, ..params });
+    let state = State::new([-1.0, 0.02]);
+    let (mut tried, mut shown) = (Vec::new(), Vec::new());
+    for _ in 0..100 {
+        let view = View { state: &state, now: Seconds(0.0), rollout_time: Seconds(0.0) };
+        let wanted = (tries.intent(view), best.intent(view));
+        assert_eq!(wanted.0, wanted.1);
+        assert_eq!(tries.shown(wanted.0), wanted.0);
+        tried.push(wanted.0.action().0);
+        shown.push(best.shown(wanted.1).action().0);
+        tell(&mut tries, &state, 0.0, &state, None);
+        tell(&mut best, &state, 0.0, &state, None);
+    }
+    assert!(tried.contains(&1.0) && shown.iter().all(|action| *action == -1.0));
+}
+
+#[test]
+fn what_is_handed_over_for_good_teaches_the_agent_no_more() {
+    let mut agent = learner(&Params::default());
+    let (state, next) = (State::new([-1.0, 0.02]), State::new([-0.98, 0.02]));
+    for is_frozen in [true, false] {
+        wish(&mut agent, &state);
+        let (applied, share) = (Action(1.0), 1.0);
+        let (end, reward, bumped) = (None, -1.0, false);
+        let (state, next) = (&state, &next);
+        let told = Feedback { state, applied, reward, next, end, share, bumped, is_frozen };
+        agent.told(&told);
+        assert_eq!(agent.learned().is_empty(), is_frozen);
+    }
 }
 
 #[test]

@@ -213,6 +213,7 @@ struct Replay<'a> {
     teacher: Teacher,
     sharing: Sharing,
     by_episode: bool,
+    from_gate: bool,
     returns: bool,
     /// How the rollout before ended.
     before: Option<End>,
@@ -233,6 +234,7 @@ impl<'a> Replay<'a> {
             teacher: Teacher::new(&profile.teaching, profile.tick(), &names),
             sharing: Sharing::new(&profile.sharing, sidecar.mode, &regions),
             by_episode: profile.sharing.window_episodes.is_some(),
+            from_gate: profile.teaching.from_gate,
             returns: profile.session.returns,
             before: None,
             total_measure: 0.0,
@@ -276,7 +278,7 @@ impl<'a> Replay<'a> {
             cost,
             human: row.u_human.map_or(Intent::Absent, Intent::fresh),
             applied,
-            teaches: !self.sharing.is_learner_frozen(region),
+            teaches: self.sharing.teaches(region, self.from_gate),
         });
         lesson.into_iter().for_each(learn);
     }

@@ -1,0 +1,24 @@
+//! The studies that are built into the program.
+
+use std::path::Path;
+
+use super::StudyError;
+use crate::profile::Text;
+
+/// The studies built into the program.
+const BUILT_IN: [(&str, &str); 4] = [
+    ("balance", include_str!("../../../profiles/studies/balance.ron")),
+    ("mountain-car", include_str!("../../../profiles/studies/mountain-car.ron")),
+    ("mountain-car-feasible", include_str!("../../../profiles/studies/mountain-car-feasible.ron")),
+    ("swing-up", include_str!("../../../profiles/studies/swing-up.ron")),
+];
+
+/// The study called `name_or_path`, in the folder `studies` of `profiles` or built in.
+pub(super) fn find(name_or_path: &str, profiles: &Path) -> Result<Text, StudyError> {
+    Ok(Text::find("study", name_or_path, &profiles.join("studies"), &BUILT_IN)?)
+}
+
+/// The names of the studies that are built in.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    BUILT_IN.iter().map(|(name, _)| *name)
+}
