@@ -231,8 +231,16 @@ pub struct Study {
 pub enum StudyCommand {
     /// Join the folders of shards, and say what is missing.
     Merge(Merge),
-    /// The studies that are built in.
-    List,
+    /// The studies in `profiles/studies/` and those that are built in.
+    List(StudyList),
+}
+
+/// The words of `study list`.
+#[derive(Args, Debug)]
+pub struct StudyList {
+    /// Print one JSON object instead of lines.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Which study, and how it is carried out.
@@ -262,7 +270,13 @@ pub struct StudyWords {
     pub keep_steps: bool,
     /// Write the script of a Slurm array of JOBS shares [default: 10 minutes each], and run nothing
     /// but what tells how much a run needs.
-    #[arg(long, value_name = "JOBS", num_args = 0..=1, require_equals = true)]
+    #[arg(
+        long,
+        value_name = "JOBS",
+        num_args = 0..=1,
+        require_equals = true,
+        value_parser = value_parser!(u32).range(1..=1000)
+    )]
     pub slurm: Option<Option<u32>>,
     /// Print one JSON object instead of tables.
     #[arg(long)]

@@ -27,7 +27,7 @@ pub use document::{Document, Origin, Set};
 pub use experiment::Experiment;
 pub use layout::Profile;
 pub use library::{Listed, ProfileError, list};
-pub use order::Order;
+pub use order::{Order, shell_word};
 pub use report::{Fault, Report};
 pub use show::show;
 pub use text::{Text, Wrong};

@@ -3,3 +3,4 @@
 pub mod achieved;
 pub mod metrics;
 pub mod spread;
+pub mod statistics;

@@ -47,7 +47,7 @@ pub enum ProfileError {
         name: String,
         /// `: did you mean …?`, or nothing.
         hint: String,
-        /// The names of all that are built in.
+        /// The names of all.
         known: String,
     },
     /// The path leads to a folder.

@@ -108,7 +108,8 @@ fn short_form(key: &str, value: &str) -> Option<(&'static str, String)> {
 }
 
 /// `word` as a shell reads it.
-fn shell_word(word: &str) -> String {
+#[must_use]
+pub fn shell_word(word: &str) -> String {
     let is_plain = |b: u8| b.is_ascii_alphanumeric() || b"-_./:=,+@%".contains(&b);
     if !word.is_empty() && word.bytes().all(is_plain) {
         word.to_owned()

@@ -1,5 +1,6 @@
 //! Texts in RON that are no profiles but stand beside them: studies.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -55,14 +56,26 @@ impl Text {
                 source: (*source).to_owned(),
             });
         }
-        let known = || built_in.iter().map(|(name, _)| *name);
-        let near = nearest(name_or_path, known());
+        let known = Self::names(folder, built_in);
+        let near = nearest(name_or_path, known.iter().map(String::as_str));
         Err(ProfileError::Stranger {
             what,
             name: clip(name_or_path),
             hint: near.map(|near| format!(": did you mean `{near}`?")).unwrap_or_default(),
-            known: known().collect::<Vec<_>>().join(", "),
+            known: known.join(", "),
         })
+    }
+
+    /// The names of all texts: files of `folder`, and those `built_in`.
+    #[must_use]
+    pub fn names(folder: &Path, built_in: &[(&str, &str)]) -> Vec<String> {
+        let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let files = files
+            .map(|file| file.path())
+            .filter(|path| path.extension().is_some_and(|end| end == "ron") && path.is_file());
+        let files = files.filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned()));
+        let built_in = built_in.iter().map(|(name, _)| (*name).to_owned());
+        files.chain(built_in).collect::<BTreeSet<String>>().into_iter().collect()
     }
 
     /// Whether these words are a path, and no name.

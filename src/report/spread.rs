@@ -1,12 +1,9 @@
 //! How sure a mean is: the median beside it, and a 95 % interval.
 
-use rand::RngExt;
+use super::statistics;
 
-use super::metrics::mean;
-use crate::random::{Place, Purpose, stream};
-
-/// Resamples of the bootstrap.
-const RESAMPLES: usize = 2000;
+/// The fewest values of whose mean an interval is given.
+pub const LEAST_VALUES: usize = 5;
 
 /// The middle of `values`; none of nothing.
 #[must_use]
@@ -19,25 +16,11 @@ pub fn median(values: &[f64]) -> Option<f64> {
     Some(if is_odd { upper } else { f64::midpoint(*sorted.get(half - 1)?, upper) })
 }
 
-/// The 95 % interval of the mean of `values` by the percentile bootstrap (Efron 1979), with
-/// chance of its own; none below two values.
+/// The 95 % interval of the mean of `values` by the bootstrap, bias-corrected and accelerated, with
+/// chance of its own. None below [`LEAST_VALUES`]: it would be far too narrow.
 #[must_use]
 pub fn interval95(values: &[f64]) -> Option<(f64, f64)> {
-    if values.len() < 2 {
-        return None;
-    }
-    let mut chance = stream(0, Purpose::Bootstrap, Place::default());
-    let mut means: Vec<f64> = (0..RESAMPLES)
-        .map(|_| {
-            let drawn: Vec<f64> = (0..values.len())
-                .filter_map(|_| values.get(chance.random_range(0..values.len())).copied())
-                .collect();
-            mean(&drawn)
-        })
-        .collect();
-    means.sort_by(f64::total_cmp);
-    let at = |part: usize| means.get(RESAMPLES * part / 1000).copied();
-    Some((at(25)?, at(975)?))
+    if values.len() < LEAST_VALUES { None } else { statistics::interval95(values, 0) }
 }
 
 #[cfg(test)]
@@ -60,7 +43,7 @@ mod tests {
         let (low, high) = interval95(&values).unwrap();
         assert!((low - 44.84).abs() < 0.6 && (high - 56.16).abs() < 0.6, "{low} {high}");
         assert_eq!(interval95(&values), Some((low, high)), "the same each time");
-        assert_eq!(interval95(&[7.0, 7.0, 7.0]), Some((7.0, 7.0)));
-        assert_eq!(interval95(&[7.0]), None);
+        assert_eq!(interval95(&[7.0; 5]), Some((7.0, 7.0)));
+        assert_eq!(interval95(&[7.0, 8.0, 6.0, 9.0]), None);
     }
 }

@@ -54,7 +54,7 @@ struct Alone {
     mean: Option<f64>,
     /// the median,
     median: Option<f64>,
-    /// and the 95 % interval of the mean (percentile bootstrap over the rollouts).
+    /// and the 95 % interval of the mean (BCa bootstrap over the rollouts); none of fewer than five.
     interval95: Option<(f64, f64)>,
 }
 

@@ -7,7 +7,7 @@
 //!     session: the one control cycle on virtual time; policies tested at each tenth of main
 //!                                       │
 //!                                       ▼ folder: runs/00001.json …, each whole or not there
-//!     table: results.csv     summary: means, medians, intervals, differences     figures
+//!     conclude: results.csv, summary.json (means, intervals, differences), figures, words
 //! ```
 //!
 //! A run depends on nothing but its study and its number. The arms of a seed have the same
@@ -15,8 +15,12 @@
 //! are the same to the last bit with any number of threads, in shards, or taken up again after a
 //! kill.
 
+mod check;
+mod conclude;
+mod fields;
 mod figures;
 mod folder;
+mod identity;
 mod library;
 mod merge;
 mod notes;
@@ -26,10 +30,13 @@ mod plan;
 mod readout;
 mod results;
 mod session;
+mod shard;
 pub mod slurm;
 mod summary;
+mod sweep;
 mod table;
 mod tracks;
+mod words;
 mod work;
 
 use std::io;
@@ -39,16 +46,15 @@ use crate::learner::BuildError;
 use crate::profile::{ProfileError, Report};
 use crate::record;
 
-pub use figures::draw;
-pub use folder::{Card, Folder, Kept, Outcome, card, read};
+pub use conclude::{Conclusion, Manner, conclude};
+pub use folder::{Card, Folder, Kept, Outcome, card, read, steps};
 pub use library::names;
 pub use merge::{Merged, merge};
 pub use params::{Params, Readout, Reference};
-pub use plan::{Changes, Labels, REFERENCE_ARM, Run, Shard, Study, What};
+pub use plan::{Changes, Labels, REFERENCE_ARM, Run, Study, What};
 pub use results::{Cells, Done, Point, Row, Table, Trajectory};
 pub use session::{Failure, perform, person};
-pub use summary::{Difference, Group, Summary, summarise};
-pub use table::write_table;
+pub use shard::Shard;
 pub use work::{Desk, Perform, Progress, Tally, work};
 
 /// Why a study was not done.
@@ -72,6 +78,15 @@ pub enum StudyError {
         /// What.
         problem: String,
     },
+    /// Changes that do not go with the study, or with each other.
+    #[error("{problem}")]
+    Sets {
+        /// Why, and what to do.
+        problem: String,
+    },
+    /// A signal came.
+    #[error("interrupted")]
+    Interrupted,
     /// The folder holds something else.
     #[error("{} holds something else: {why}; choose another folder with --out DIR, or take this one away", path.display())]
     OtherStudy {
@@ -85,6 +100,15 @@ pub enum StudyError {
     NoStudy {
         /// The folder.
         path: PathBuf,
+    },
+    /// The folder's card cannot be read.
+    #[error(
+        "{why}; without it nobody knows of which study its runs are: put study.json back from a copy, \
+         or take the folder away"
+    )]
+    Card {
+        /// Which, and why.
+        why: record::Error,
     },
     /// Somebody else works in the folder.
     #[error("{} is in use: another coadapt works on this study; let that one end first", path.display())]
@@ -100,6 +124,26 @@ pub enum StudyError {
         /// the first one,
         first: PathBuf,
         /// and why.
+        why: String,
+    },
+    /// The study of shards cannot be found again.
+    #[error("the study of {}, {found}, cannot be read again: {why}; put back where it was what is missing", path.display())]
+    Gone {
+        /// The first shard,
+        path: PathBuf,
+        /// the name or path of its study,
+        found: String,
+        /// and why.
+        why: Box<StudyError>,
+    },
+    /// The study of shards is not what it was.
+    #[error("{} is of another study than {found} is now: {why}; put it back as it was, or run the shards anew", path.display())]
+    Changed {
+        /// The first shard,
+        path: PathBuf,
+        /// the name or path of its study,
+        found: String,
+        /// and what has changed.
         why: String,
     },
     /// The disk refused.
@@ -125,7 +169,7 @@ impl StudyError {
     /// Whether it is what was asked for that is wrong, and not what happened.
     #[must_use]
     pub const fn is_usage(&self) -> bool {
-        !matches!(self, Self::Disk { .. } | Self::Busy { .. })
+        !matches!(self, Self::Disk { .. } | Self::Busy { .. } | Self::Interrupted)
     }
 }
 

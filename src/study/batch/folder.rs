@@ -8,8 +8,10 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::StudyError;
-use super::plan::{Run, Shard, Study};
+use super::plan::{Run, Study};
 use super::results::Done;
+use super::shard::Shard;
+use crate::profile::shell_word;
 use crate::record::{self, Document};
 
 /// What study a folder holds.
@@ -29,8 +31,42 @@ pub struct Card {
     pub shard: u32,
     /// and of how many.
     pub shards: u32,
-    /// All that its results depend on.
+    /// A word for all that its results depend on: the texts themselves, with a profile for each
+    /// arm and setting, may be as long as the results.
     pub identity: String,
+}
+
+impl Card {
+    /// In what it is another study than `other`.
+    pub(super) fn otherness(&self, other: &Self) -> String {
+        let sets = |sets: &[(String, String)]| {
+            let words: Vec<String> = sets.iter().map(|(k, v)| format!("--set {k}={v}")).collect();
+            if words.is_empty() { "no --set".to_owned() } else { words.join(" ") }
+        };
+        let seeds = |seeds: Option<u32>| {
+            seeds.map_or_else(|| "no --seeds".to_owned(), |seeds| format!("--seeds {seeds}"))
+        };
+        if self.name != other.name {
+            format!("it is the study {}, not {}", self.name, other.name)
+        } else if self.sets != other.sets {
+            format!("it has other settings: {}, not {}", sets(&self.sets), sets(&other.sets))
+        } else if self.seeds != other.seeds {
+            format!("it has other seeds: {}, not {}", seeds(self.seeds), seeds(other.seeds))
+        } else {
+            "the study's file or its profile has changed since".to_owned()
+        }
+    }
+
+    /// The words after `coadapt study` that ask for the same from a shell.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let mut words = vec![shell_word(&self.found)];
+        for (key, value) in &self.sets {
+            words.extend(["--set".to_owned(), shell_word(&format!("{key}={value}"))]);
+        }
+        words.extend(self.seeds.map(|seeds| format!("--seeds {seeds}")));
+        words.join(" ")
+    }
 }
 
 impl Document for Card {
@@ -77,20 +113,20 @@ impl Folder {
     /// # Errors
     /// When it holds something else, another process works in it, or the disk refuses.
     pub fn open(path: &Path, card: &Card) -> Result<Self, StudyError> {
-        let is_new = match fs::read_dir(path) {
-            Ok(mut entries) => entries.all(|entry| entry.is_ok_and(|e| e.file_name() == ".lock")),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => true,
-            Err(error) => return Err(StudyError::disk("list", path, error)),
-        };
-        if !is_new {
+        fs::create_dir_all(path).map_err(|error| StudyError::disk("make", path, error))?;
+        if !is_new(path)? {
+            // Nothing is put into what is somebody else's.
+            fits(path, card)?;
+        }
+        let lock = locked(path)?;
+        if is_new(path)? {
+            // The card comes first and outlives a loss of power: runs without it would be lost.
+            record::write_document(&path.join(CARD), card, true)?;
+        } else {
             fits(path, card)?;
         }
         let runs = path.join("runs");
         fs::create_dir_all(&runs).map_err(|error| StudyError::disk("make", &runs, error))?;
-        let lock = locked(path)?;
-        if is_new {
-            record::write_document(&path.join(CARD), card, false)?;
-        }
         Ok(Self { path: path.to_owned(), _lock: lock })
     }
 
@@ -116,28 +152,76 @@ impl Folder {
         Ok(record::write_document(&file(&self.path, number), kept, false)?)
     }
 
-    /// Where the step rows of a run go.
+    /// Makes the folder for step rows.
     ///
     /// # Errors
     /// When the disk refuses.
-    pub fn steps(&self, number: u32) -> Result<PathBuf, StudyError> {
-        let steps = self.path.join("steps");
-        fs::create_dir_all(&steps).map_err(|error| StudyError::disk("make", &steps, error))?;
-        Ok(steps.join(format!("{number:05}.csv")))
+    pub fn make_steps(&self) -> Result<(), StudyError> {
+        let steps = self.path.join(STEPS);
+        fs::create_dir_all(&steps).map_err(|error| StudyError::disk("make", &steps, error))
+    }
+
+    /// Copies the step rows of a run from the folder `other`, if it has them.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn copy_steps(&self, other: &Path, number: u32) -> Result<(), StudyError> {
+        let (from, to) = (steps(other, number), steps(&self.path, number));
+        if !from.exists() || to.exists() {
+            return Ok(());
+        }
+        self.make_steps()?;
+        let new = to.with_extension("csv.new");
+        let copied = fs::copy(&from, &new).and_then(|_| fs::rename(&new, &to));
+        copied.map_err(|error| {
+            let _ = fs::remove_file(&new);
+            StudyError::disk("write", &to, error)
+        })
     }
 }
 
+/// Where the step rows of a run go in `folder`.
+#[must_use]
+pub fn steps(folder: &Path, number: u32) -> PathBuf {
+    folder.join(STEPS).join(format!("{number:05}.csv"))
+}
+
+const STEPS: &str = "steps";
 const CARD: &str = "study.json";
 
 fn file(folder: &Path, number: u32) -> PathBuf {
     folder.join("runs").join(format!("{number:05}.json"))
 }
 
-/// What `folder` holds of the run of that `number`. A file that cannot be read counts as none:
-/// the run is done once more.
+/// What `folder` holds of the run of that `number`. A file that cannot be read, or is that of
+/// another run, counts as none: the run is done once more.
 #[must_use]
 pub fn read(folder: &Path, number: u32) -> Option<Kept> {
-    record::read_document::<Kept>(&file(folder, number)).ok()
+    let kept = record::read_document::<Kept>(&file(folder, number)).ok()?;
+    let is_it = match &kept.outcome {
+        Outcome::Done(done) => done.labels.run == number,
+        Outcome::Failed(_) => true,
+    };
+    is_it.then_some(kept)
+}
+
+/// Whether nothing in the folder `path` is of use: what a study leaves that was ended before it had
+/// begun.
+fn is_new(path: &Path) -> Result<bool, StudyError> {
+    let entries = fs::read_dir(path).map_err(|error| StudyError::disk("list", path, error))?;
+    let is_empty = |path: &Path| fs::read_dir(path).is_ok_and(|mut found| found.next().is_none());
+    let is_of_no_use = |entry: fs::DirEntry| match entry.file_name().to_str() {
+        Some(".lock" | "study.json.new") => true,
+        Some("runs") => is_empty(&entry.path()),
+        _ => false,
+    };
+    for entry in entries {
+        let entry = entry.map_err(|error| StudyError::disk("list", path, error))?;
+        if !is_of_no_use(entry) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 fn is_done(folder: &Path, number: u32) -> bool {
@@ -152,13 +236,21 @@ pub fn card(folder: &Path) -> Result<Card, StudyError> {
     if !folder.join(CARD).exists() {
         return Err(StudyError::NoStudy { path: folder.to_owned() });
     }
-    Ok(record::read_document(&folder.join(CARD))?)
+    record::read_document(&folder.join(CARD)).map_err(|error| match StudyError::from(error) {
+        StudyError::File(why) => StudyError::Card { why },
+        refused => refused,
+    })
 }
 
 /// That the folder `path`, which is not empty, holds the study of `wanted`.
 fn fits(path: &Path, wanted: &Card) -> Result<(), StudyError> {
-    let found = card(path)?;
     let other = |why: String| StudyError::OtherStudy { path: path.to_owned(), why };
+    let found = match card(path) {
+        Err(StudyError::NoStudy { .. }) => {
+            return Err(other("there is no study.json in it".to_owned()));
+        }
+        found => found?,
+    };
     if found.version != wanted.version {
         return Err(other(format!(
             "its runs are those of coadapt {}, and this is {}",
@@ -166,12 +258,7 @@ fn fits(path: &Path, wanted: &Card) -> Result<(), StudyError> {
         )));
     }
     if found.identity != wanted.identity {
-        return Err(other(if found.name == wanted.name {
-            "it was run with other settings or seeds, or its file or profile has changed since"
-                .to_owned()
-        } else {
-            format!("it is the study {}", found.name)
-        }));
+        return Err(other(found.otherness(wanted)));
     }
     if (found.shard, found.shards) != (wanted.shard, wanted.shards) {
         return Err(other(format!("it is the shard {}/{}", found.shard, found.shards)));

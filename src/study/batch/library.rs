@@ -1,4 +1,4 @@
-//! The studies that are built into the program.
+//! The studies that can be called by a name.
 
 use std::path::Path;
 
@@ -18,7 +18,9 @@ pub(super) fn find(name_or_path: &str, profiles: &Path) -> Result<Text, StudyErr
     Ok(Text::find("study", name_or_path, &profiles.join("studies"), &BUILT_IN)?)
 }
 
-/// The names of the studies that are built in.
-pub fn names() -> impl Iterator<Item = &'static str> {
-    BUILT_IN.iter().map(|(name, _)| *name)
+/// The names of all studies: those in the folder `studies` of `profiles` and those that are built
+/// in.
+#[must_use]
+pub fn names(profiles: &Path) -> Vec<String> {
+    Text::names(&profiles.join("studies"), &BUILT_IN)
 }

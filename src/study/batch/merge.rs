@@ -1,10 +1,11 @@
 //! Shards of a study, joined.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::folder::{Card, card, read};
 use super::plan::{Changes, Study};
+use super::shard::Shard;
 use super::{Kept, Outcome, StudyError};
 
 /// A study whose runs are in several folders.
@@ -18,11 +19,15 @@ pub struct Merged {
 }
 
 /// Joins what is in `folders`. The study is found again as it was asked for; `profiles` is the
-/// folder of profiles.
+/// folder of profiles. `is_enough` says when to give up.
 ///
 /// # Errors
 /// When one of them holds no study, or another one, or the study is no longer what it was.
-pub fn merge(folders: &[PathBuf], profiles: &Path) -> Result<Merged, StudyError> {
+pub fn merge(
+    folders: &[PathBuf],
+    profiles: &Path,
+    is_enough: &dyn Fn() -> bool,
+) -> Result<Merged, StudyError> {
     let mut cards = Vec::new();
     for folder in folders {
         cards.push((folder, card(folder)?));
@@ -40,53 +45,62 @@ pub fn merge(folders: &[PathBuf], profiles: &Path) -> Result<Merged, StudyError>
             let why = format!("it is of coadapt {}, not {}", card.version, known.version);
             return Err(misfit(path, why));
         }
-        if card.name != known.name {
-            let why = format!("it is the study {}, not {}", card.name, known.name);
-            return Err(misfit(path, why));
-        }
         if card.identity != known.identity {
-            let why = "the study, its settings or its profile differ".to_owned();
-            return Err(misfit(path, why));
+            return Err(misfit(path, card.otherness(known)));
         }
     }
-    let changes = Changes { sets: known.sets.clone(), seeds: known.seeds };
-    let study = Study::find(&known.found, profiles, &changes)?;
-    if known.version != env!("CARGO_PKG_VERSION") || study.identity() != known.identity {
+    let (path, found) = ((*first).clone(), known.found.clone());
+    if known.version != env!("CARGO_PKG_VERSION") {
         let why = format!(
-            "it was run by coadapt {}, or {} or its profile has changed since",
-            known.version, known.found
+            "its runs are those of coadapt {}, and this is {}",
+            known.version,
+            env!("CARGO_PKG_VERSION")
         );
-        return Err(StudyError::OtherStudy { path: (*first).clone(), why });
+        return Err(StudyError::OtherStudy { path, why });
+    }
+    let changes = Changes { sets: known.sets.clone(), seeds: known.seeds };
+    let study = match Study::find(&found, profiles, &changes, is_enough) {
+        Err(StudyError::Interrupted) => return Err(StudyError::Interrupted),
+        Err(why) => return Err(StudyError::Gone { path, found, why: Box::new(why) }),
+        Ok(study) => study,
+    };
+    if study.identity() != known.identity {
+        let why = "its file or its profile has changed since".to_owned();
+        return Err(StudyError::Changed { path, found, why });
     }
     let card = Card { shard: 1, shards: 1, ..known.clone() };
     Ok(Merged { study, card, folders: folders.to_vec() })
 }
 
 impl Merged {
-    /// What came of the run of that `number`: of several results one that is done.
+    /// What came of the run of that `number`, and where: of several results one that is done.
     #[must_use]
-    pub fn read(&self, number: u32) -> Option<Kept> {
-        let mut found: Option<Kept> = None;
-        for kept in self.folders.iter().filter_map(|folder| read(folder, number)) {
-            let is_better =
-                found.as_ref().is_none_or(|found| matches!(found.outcome, Outcome::Failed(_)));
-            if is_better {
-                found = Some(kept);
+    pub fn read(&self, number: u32) -> Option<(&Path, Kept)> {
+        let mut found: Option<(&Path, Kept)> = None;
+        for folder in &self.folders {
+            let is_open = |found: &(&Path, Kept)| matches!(found.1.outcome, Outcome::Failed(_));
+            if found.as_ref().is_none_or(is_open)
+                && let Some(kept) = read(folder, number)
+            {
+                found = Some((folder, kept));
             }
         }
         found
     }
 
-    /// The shards that none of the folders holds, by the number of shards that they say.
+    /// The shards that none of the folders holds and that have one of the `missing` runs, by the
+    /// number of shards that the folders say.
     #[must_use]
-    pub fn absent(&self) -> BTreeMap<u32, Vec<u32>> {
-        let mut held: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    pub fn absent(&self, missing: &[u32]) -> Vec<Shard> {
+        let mut held: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
         for card in self.folders.iter().filter_map(|folder| card(folder).ok()) {
-            held.entry(card.shards).or_default().push(card.shard);
+            held.entry(card.shards.max(1)).or_default().insert(card.shard);
         }
-        held.into_iter()
-            .map(|(of, held)| (of, (1..=of).filter(|shard| !held.contains(shard)).collect()))
-            .filter(|(_, absent): &(u32, Vec<u32>)| !absent.is_empty())
-            .collect()
+        let mut absent = BTreeSet::new();
+        for (of, held) in held {
+            let lacking = missing.iter().map(|run| Shard::of_run(*run, of).number);
+            absent.extend(lacking.filter(|number| !held.contains(number)).map(|n| (of, n)));
+        }
+        absent.into_iter().map(|(of, number)| Shard { number, of }).collect()
     }
 }

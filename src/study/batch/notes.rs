@@ -28,7 +28,7 @@ pub(super) struct Notes {
     /// A point every so many rollouts.
     every: u32,
     steps: Option<(StepFile, PathBuf)>,
-    fault: Option<String>,
+    fault: Option<record::Error>,
 }
 
 impl Notes {
@@ -77,6 +77,11 @@ impl Notes {
         measures(self.task, &rows).into_iter().chain(ends).map(row).collect()
     }
 
+    /// Why a step row could not be kept, if so.
+    pub(super) fn refused(&mut self) -> Option<record::Error> {
+        self.fault.take()
+    }
+
     /// Closes the file of step rows, and hands out how main went.
     pub(super) fn close(self) -> Result<Vec<Point>, record::Error> {
         if let Some((file, path)) = self.steps {
@@ -97,7 +102,7 @@ impl Witness for Notes {
         if let Some((file, _)) = &mut self.steps
             && let Err(error) = file.append(row)
         {
-            self.fault.get_or_insert(error.to_string());
+            self.fault.get_or_insert(error);
         }
     }
 
@@ -108,7 +113,8 @@ impl Witness for Notes {
         self.tenth.push(*row);
         self.values.extend((yardstick(self.task).of)(row));
         if row.episode.is_multiple_of(self.every) {
-            let value = mean(&std::mem::take(&mut self.values));
+            let values = std::mem::take(&mut self.values);
+            let value = (!values.is_empty()).then(|| mean(&values));
             let (episode, success) = (row.episode, row.success.unwrap_or(0.0));
             self.curve.push(Point { episode, success, share: row.share.unwrap_or(1.0), value });
         }
@@ -128,6 +134,6 @@ impl Witness for Notes {
     }
 
     fn fault(&self) -> Option<String> {
-        self.fault.clone()
+        self.fault.as_ref().map(ToString::to_string)
     }
 }

@@ -1,22 +1,22 @@
 //! From a study's file to its runs: checked, and always in the same order.
 
+use std::collections::HashMap;
 use std::fmt;
 use std::path::Path;
-use std::str::FromStr;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use super::params::{Arm, Pair, Params, Readout, Reference, Sets, Setting};
+use super::check::{faults, misfits};
+use super::identity::Fingerprint;
+use super::params::{Arm, Pair, Params, Setting};
+use super::shard::Shard;
+use super::sweep::sweep;
 use super::{StudyError, library};
 use crate::operator::Choice;
 use crate::profile::{Document, Profile, Text, Wrong};
 use crate::session::plan::Wanted;
-use crate::task::mountain_car::MountainCar;
 
 /// The most runs that a study may have.
 const MOST_RUNS: usize = 1_000_000;
-/// The most seeds.
-const MOST_SEEDS: u32 = 100_000;
-/// The most starts of a policy.
-const MOST_STARTS: u32 = 100_000;
 /// The word for the runs that are no arm: what arms are compared with.
 pub const REFERENCE_ARM: &str = "reference";
 
@@ -30,7 +30,7 @@ pub struct Changes {
 }
 
 /// A study, checked, with all its runs.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Study {
     /// Its name.
     pub name: String,
@@ -38,8 +38,13 @@ pub struct Study {
     pub params: Params,
     /// All its runs, by number.
     pub runs: Vec<Run>,
-    /// The profile of each setting and arm.
-    profiles: Vec<Vec<Profile>>,
+    /// The profile that all are based on.
+    base: Document,
+    /// The profile of the first run.
+    first: Arc<Profile>,
+    /// The profiles of the setting that was asked for last, by arm: those of all settings would
+    /// fill the memory.
+    latest: Mutex<Option<(usize, Vec<Arc<Profile>>)>>,
     identity: String,
 }
 
@@ -71,7 +76,7 @@ pub enum What {
 }
 
 impl Study {
-    /// The study called `name_or_path`, with `changes`.
+    /// The study called `name_or_path`, with `changes`. `is_enough` says when to give up.
     ///
     /// # Errors
     /// When there is no such study, or with all that is wrong with it.
@@ -79,60 +84,94 @@ impl Study {
         name_or_path: &str,
         profiles: &Path,
         changes: &Changes,
+        is_enough: &dyn Fn() -> bool,
     ) -> Result<Self, StudyError> {
-        Self::of(&library::find(name_or_path, profiles)?, profiles, changes)
+        Self::of(&library::find(name_or_path, profiles)?, profiles, changes, is_enough)
     }
 
-    /// The study of `text`, based on a profile of the folder `profiles`.
+    /// The study of `text`, based on a profile of the folder `profiles`. `is_enough` says when to
+    /// give up.
     ///
     /// # Errors
     /// With all that is wrong with it.
-    pub fn of(text: &Text, profiles: &Path, changes: &Changes) -> Result<Self, StudyError> {
+    pub fn of(
+        text: &Text,
+        profiles: &Path,
+        changes: &Changes,
+        is_enough: &dyn Fn() -> bool,
+    ) -> Result<Self, StudyError> {
         let mut params: Params = text.parse().map_err(StudyError::Text)?;
         if let Some(count) = changes.seeds {
             params.seeds.count = count;
         }
-        let wrong = faults(&params);
-        if !wrong.is_empty() {
-            return Err(StudyError::Text(text.refuse(wrong)));
-        }
-        params.settings = sweep(&params.settings, &changes.sets);
+        refuse(text, faults(&params))?;
+        params.settings = sweep(&params, &changes.sets)?;
+        // Counted before they are made.
+        let many = count(&params).filter(|many| *many <= MOST_RUNS);
+        let problem = || format!("there are more than {MOST_RUNS} runs");
+        let many = many.ok_or_else(|| StudyError::TooMany { problem: problem() })?;
         let base = Document::find(&params.profile, profiles)?;
-        let profiles = read_profiles(&base, &params)?;
-        let wrong = misfits(&params, &profiles);
-        if !wrong.is_empty() {
-            return Err(StudyError::Text(text.refuse(wrong)));
-        }
-        let runs = runs(&params);
-        if runs.len() > MOST_RUNS {
-            let problem = format!("{} runs are more than {MOST_RUNS}", runs.len());
-            return Err(StudyError::TooMany { problem });
-        }
-        let identity = identity(&params, &profiles);
-        Ok(Self { name: text.name().to_owned(), params, runs, profiles, identity })
+        // Faults of the base are told once, not for every arm.
+        let mut plain = base.clone();
+        plain.change(params.sets.iter());
+        let first = Arc::new(plain.read().map_err(StudyError::Text)?);
+        refuse(text, misfits(&params, &first.experiment))?;
+        let identity = survey(text, &base, &params, is_enough)?;
+        let runs = runs(&params, many);
+        let name = text.name().to_owned();
+        let latest = Mutex::new(None);
+        let mut study = Self { name, params, runs, base, first, latest, identity };
+        study.first = study.profile(&study.runs[0])?;
+        Ok(study)
     }
 
-    /// Everything that its results depend on, as one text: two studies with the same give the
-    /// same results.
+    /// A word for everything that its results depend on: two studies with the same give the same
+    /// results.
     #[must_use]
     pub fn identity(&self) -> &str {
         &self.identity
     }
 
     /// The profile of a run; that of references is the first arm's.
-    #[must_use]
-    pub fn profile(&self, run: &Run) -> &Profile {
+    ///
+    /// # Errors
+    /// None of a study that was found right.
+    pub fn profile(&self, run: &Run) -> Result<Arc<Profile>, StudyError> {
         let arm = match run.what {
             What::Session { arm, .. } => arm,
             What::References => 0,
         };
-        &self.profiles[run.setting][arm]
+        let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((setting, profiles)) = &*latest
+            && *setting == run.setting
+        {
+            return Ok(Arc::clone(&profiles[arm]));
+        }
+        let setting = &self.params.settings[run.setting];
+        let of_arm = |arm| read_profile(&self.base, &self.params, setting, arm).map(Arc::new);
+        let profiles =
+            self.params.arms.iter().map(of_arm).collect::<Result<Vec<_>, StudyError>>()?;
+        let profile = Arc::clone(&profiles[arm]);
+        *latest = Some((run.setting, profiles));
+        Ok(profile)
     }
 
     /// The name of the task.
     #[must_use]
     pub fn task(&self) -> &'static str {
-        self.profiles[0][0].experiment.name()
+        self.first.experiment.name()
+    }
+
+    /// The names of the task's states.
+    #[must_use]
+    pub fn columns(&self) -> &'static [&'static str] {
+        self.first.experiment.columns()
+    }
+
+    /// The last checkpoint, %.
+    #[must_use]
+    pub fn last_checkpoint(&self) -> u8 {
+        self.params.checkpoints.last().copied().unwrap_or(100)
     }
 
     /// How results call a run.
@@ -170,6 +209,37 @@ impl Study {
         }
         pairs
     }
+
+    /// Who steered the runs of the arm `from` that those of the arm `of` with `operator` are
+    /// compared with: the same, but where an arm has an operator of its own.
+    #[must_use]
+    pub fn opposite(&self, of: &str, from: &str, operator: &str) -> Vec<String> {
+        let arm = |name: &str| self.params.arms.iter().find(|arm| arm.name == name);
+        match (arm(of), arm(from)) {
+            (Some(of), Some(from)) if of.operator.is_some() || from.operator.is_some() => {
+                choices(&self.params, from).map(|choice| choice.to_string()).collect()
+            }
+            _ => vec![operator.to_owned()],
+        }
+    }
+
+    /// Whether two runs, one after the other, may be compared: what such runs came to is held in
+    /// memory together.
+    #[must_use]
+    pub fn are_together(&self, a: &Run, b: &Run) -> bool {
+        let is_mixed = self.params.arms.iter().any(|arm| arm.operator.is_some());
+        a.setting == b.setting && (is_mixed || a.operator() == b.operator())
+    }
+}
+
+impl Run {
+    /// Who steers.
+    fn operator(&self) -> Option<&Choice> {
+        match &self.what {
+            What::Session { operator, .. } => Some(operator),
+            What::References => None,
+        }
+    }
 }
 
 /// How results call a run.
@@ -198,76 +268,56 @@ impl fmt::Display for Labels {
     }
 }
 
-/// The `number`th of `of` shares of a study's runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    /// From 1.
-    pub number: u32,
-    /// How many there are.
-    pub of: u32,
-}
-
-impl Shard {
-    /// The only share: all runs.
-    pub const WHOLE: Self = Self { number: 1, of: 1 };
-
-    /// Whether the run of that number is in it: they are dealt out one by one.
-    #[must_use]
-    pub const fn holds(self, run: u32) -> bool {
-        run.saturating_sub(1) % self.of == self.number - 1
-    }
-}
-
-impl FromStr for Shard {
-    type Err = String;
-
-    fn from_str(words: &str) -> Result<Self, String> {
-        let shard = words.split_once('/').and_then(|(number, of)| {
-            Some(Self { number: number.trim().parse().ok()?, of: of.trim().parse().ok()? })
-        });
-        shard
-            .filter(|shard| (1..=shard.of).contains(&shard.number))
-            .ok_or_else(|| "give K/N, share K of N, K from 1 to N, such as 1/8".to_owned())
-    }
-}
-
-impl fmt::Display for Shard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.number, self.of)
-    }
-}
-
-/// Who steers in `arm`.
-fn operators<'a>(params: &'a Params, arm: &'a Arm) -> &'a [String] {
+/// Who steers in `arm`, in words.
+pub(super) fn operators<'a>(params: &'a Params, arm: &'a Arm) -> &'a [String] {
     arm.operator.as_ref().map_or(&params.operators, std::slice::from_ref)
 }
 
-/// The runs, the arms of a seed one after the other.
-fn runs(params: &Params) -> Vec<Run> {
-    let mut runs = Vec::new();
-    let mut add = |setting, seed, what| {
+/// Who steers in `arm`.
+fn choices<'a>(params: &'a Params, arm: &'a Arm) -> impl Iterator<Item = Choice> + use<'a> {
+    operators(params, arm).iter().filter_map(|words| words.parse().ok())
+}
+
+/// The seeds of references: one, since they learn nothing, but where starts are drawn.
+fn reference_seeds(params: &Params) -> u32 {
+    match (params.references.is_empty(), params.starts.iter().any(|starts| starts.random)) {
+        (true, _) => 0,
+        (false, true) => params.seeds.count,
+        (false, false) => 1,
+    }
+}
+
+/// How many runs there are; none if the number is beyond all bounds.
+fn count(params: &Params) -> Option<usize> {
+    let people: usize = params.arms.iter().map(|arm| operators(params, arm).len()).sum();
+    let sessions = people.checked_mul(params.seeds.count as usize)?;
+    let of_setting = sessions.checked_add(reference_seeds(params) as usize)?;
+    of_setting.checked_mul(params.settings.len())
+}
+
+/// The runs, so `many`, the arms of a seed one after the other.
+fn runs(params: &Params, many: usize) -> Vec<Run> {
+    let mut runs = Vec::with_capacity(many);
+    let mut people: Vec<Choice> = Vec::new();
+    for choice in params.arms.iter().flat_map(|arm| choices(params, arm)) {
+        if !people.contains(&choice) {
+            people.push(choice);
+        }
+    }
+    let steers: Vec<Vec<Choice>> =
+        params.arms.iter().map(|arm| choices(params, arm).collect()).collect();
+    let mut add = |setting, seed: u32, what| {
         let number = u32::try_from(runs.len() + 1).unwrap_or(u32::MAX);
-        runs.push(Run { number, setting, seed, what });
+        runs.push(Run { number, setting, seed: params.seeds.first + u64::from(seed), what });
     };
     for setting in 0..params.settings.len() {
-        if !params.references.is_empty() {
-            add(setting, params.seeds.first, What::References);
+        for seed in 0..reference_seeds(params) {
+            add(setting, seed, What::References);
         }
-        let mut choices: Vec<&String> = Vec::new();
-        for operator in params.arms.iter().flat_map(|arm| operators(params, arm)) {
-            if !choices.contains(&operator) {
-                choices.push(operator);
-            }
-        }
-        for operator in choices {
-            for seed in 0..u64::from(params.seeds.count) {
-                for (arm, of) in params.arms.iter().enumerate() {
-                    if let Ok(choice) = operator.parse()
-                        && operators(params, of).contains(operator)
-                    {
-                        let what = What::Session { arm, operator: choice };
-                        add(setting, params.seeds.first + seed, what);
-                    }
+        for operator in &people {
+            for seed in 0..params.seeds.count {
+                for arm in (0..steers.len()).filter(|arm| steers[*arm].contains(operator)) {
+                    add(setting, seed, What::Session { arm, operator: operator.clone() });
                 }
             }
         }
@@ -275,202 +325,70 @@ fn runs(params: &Params) -> Vec<Run> {
     runs
 }
 
-/// What is wrong with `params` whatever the profile.
-fn faults(params: &Params) -> Vec<Wrong> {
-    let mut wrong = Vec::new();
-    let mut demand = |holds: bool, key, message: String, expected: &str| {
-        if !holds {
-            wrong.push(Wrong { key, message, expected: expected.to_owned() });
-        }
-    };
-    let named = "one or more, each with a name of its own: 1 to 64 letters, digits, - _ . =";
-    for (key, names) in [
-        ("arms", params.arms.iter().map(|arm| &arm.name).collect::<Vec<_>>()),
-        ("settings", params.settings.iter().map(|setting| &setting.name).collect()),
-        ("starts", params.starts.iter().map(|starts| &starts.name).collect()),
-    ] {
-        for (index, name) in names.iter().enumerate() {
-            let twice = names[..index].contains(name);
-            demand(!twice, key, format!("`{key}` has two called `{name}`"), named);
-            demand(is_name(name), key, format!("`{name}` is no name in `{key}`"), named);
-            let is_free = key != "arms" || *name != REFERENCE_ARM;
-            demand(is_free, key, format!("no arm can be called `{REFERENCE_ARM}`"), named);
-        }
-    }
-    demand(!params.arms.is_empty(), "arms", "there are no arms".to_owned(), named);
-    demand(!params.starts.is_empty(), "starts", "policies have no `starts`".to_owned(), named);
-    let seeds = params.seeds;
-    let allowed = format!("1 to {MOST_SEEDS}");
-    let message = format!("`seeds.count` is {}: there is nothing to run", seeds.count);
-    demand((1..=MOST_SEEDS).contains(&seeds.count), "seeds.count", message, &allowed);
-    let last = seeds.first.saturating_add(u64::from(seeds.count));
-    let message = format!("`seeds.first` is {}", seeds.first);
-    demand(last <= 1 << 53, "seeds.first", message, "below 2^53, which every JSON reader knows");
-    for starts in &params.starts {
-        let allowed = format!("1 to {MOST_STARTS}");
-        let message = format!("`{}` has {} starts", starts.name, starts.count);
-        demand((1..=MOST_STARTS).contains(&starts.count), "starts", message, &allowed);
-    }
-    let points = &params.checkpoints;
-    let are_tenths = points.iter().all(|point| *point % 10 == 0 && (10..=100).contains(point));
-    demand(
-        are_tenths && points.is_sorted_by(|a, b| a < b) && !points.is_empty(),
-        "checkpoints",
-        format!("`checkpoints` is {points:?}"),
-        "some of 10, 20, … 100, in order",
-    );
-    let readouts = &params.readouts;
-    let twice = (1..readouts.len()).any(|at| readouts[..at].contains(&readouts[at]));
-    demand(
-        !twice && !readouts.is_empty(),
-        "readouts",
-        format!("`readouts` is {readouts:?}"),
-        "some of agent, continuous, rounded, sign, each once",
-    );
-    for pair in &params.compare {
-        for (arm, readout) in [&pair.of, &pair.from] {
-            let is_known =
-                params.arms.iter().any(|known| known.name == *arm) && readouts.contains(readout);
-            let message = format!("there is no arm `{arm}` with the readout {}", readout.word());
-            demand(is_known, "compare", message, "arms and readouts of this study");
-        }
-    }
-    let last = params.starts.last().map_or(0, |starts| starts.count);
-    let beyond = params.trajectories.iter().find(|start| **start >= last);
-    demand(
-        beyond.is_none(),
-        "trajectories",
-        format!("there is no start {}", beyond.unwrap_or(&0)),
-        "numbers of the last of `starts`, from 0",
-    );
-    wrong
+fn refuse(text: &Text, wrong: Vec<Wrong>) -> Result<(), StudyError> {
+    if wrong.is_empty() { Ok(()) } else { Err(StudyError::Text(text.refuse(wrong))) }
 }
 
-/// What does not go with the task, or with who steers.
-fn misfits(params: &Params, profiles: &[Vec<Profile>]) -> Vec<Wrong> {
-    let mut wrong = Vec::new();
-    let experiment = &profiles[0][0].experiment;
-    let mut refuse = |key, message: String, expected: &str| {
-        let fault = Wrong { key, message, expected: expected.to_owned() };
-        if !wrong.contains(&fault) {
-            wrong.push(fault);
-        }
-    };
-    let expected = "simulated:SKILL[:TYPE], q_learning (mountain car) or none: nobody is there";
-    for arm in &params.arms {
-        let words = operators(params, arm);
-        if words.is_empty() {
-            let message = format!("nobody steers in the arm `{}`", arm.name);
-            refuse("arms", message, "an `operator` of its own, or `operators` of the study");
-        }
-        let key = if arm.operator.is_some() { "arms" } else { "operators" };
-        for word in words {
-            match word.parse::<Choice>() {
-                Ok(choice @ (Choice::Simulated(..) | Choice::QLearning | Choice::None)) => {
-                    if let Err(stranger) = experiment.knows(&choice) {
-                        refuse(key, stranger.to_string(), expected);
-                    }
-                    if params.readouts.contains(&Readout::Agent) && choice != Choice::QLearning {
-                        let message = format!("{word} is no agent whose policy could be tested");
-                        refuse("readouts", message, "agent only where q_learning steers alone");
-                    }
-                }
-                Ok(_) => refuse(key, format!("{word} needs a person or a file"), expected),
-                Err(unknown) => refuse(key, unknown.to_string(), expected),
-            }
-        }
-    }
-    for reference in &params.references {
-        if *reference != Reference::Zero && experiment.name() != MountainCar::NAME {
-            let message = format!("{} is known of the mountain car only", reference.word());
-            refuse("references", message, "zero");
-        }
-    }
-    let teaches = |profile: &Profile| profile.session.phases.contains(&Wanted::Main);
-    if !profiles.iter().flatten().all(teaches) {
-        refuse("sets", "session.phases has no main phase".to_owned(), "a main phase in every run");
-    }
-    wrong
+/// The profile of `arm` under `setting`.
+fn read_profile(
+    base: &Document,
+    params: &Params,
+    setting: &Setting,
+    arm: &Arm,
+) -> Result<Profile, StudyError> {
+    let mut document = base.clone();
+    let layers = [&params.sets, &setting.sets, &arm.sets];
+    document.change(layers.into_iter().flat_map(|sets| sets.iter()));
+    document.set("mode", arm.mode.word());
+    document.read().map_err(StudyError::Text)
 }
 
-/// The profile of each setting and arm.
-fn read_profiles(base: &Document, params: &Params) -> Result<Vec<Vec<Profile>>, StudyError> {
-    let read = |layers: &[&Sets], mode: Option<&Arm>| {
-        let mut document = base.clone();
-        document.change(layers.iter().flat_map(|sets| sets.iter()));
-        if let Some(arm) = mode {
-            document.set("mode", arm.mode.word());
-        }
-        let profile = document.read().map_err(StudyError::Text)?;
-        let task = profile.experiment.task(profile.tick());
-        let built = profile.learner.build(task.feature_names().len(), task.action_limit());
-        built.map_err(|error| StudyError::Learner { error })?;
-        Ok(profile)
-    };
-    // Faults of the base are told once, not for every arm.
-    read(&[&params.sets], None)?;
-    let of_setting = |setting: &Setting| {
-        let of_arm = |arm: &Arm| read(&[&params.sets, &setting.sets, &arm.sets], Some(arm));
-        params.arms.iter().map(of_arm).collect()
-    };
-    params.settings.iter().map(of_setting).collect()
-}
-
-/// The settings, or the one without changes, each with each of the values that are swept over.
-fn sweep(settings: &[Setting], sets: &[(String, String)]) -> Vec<Setting> {
-    let plain = Setting { name: "profile".to_owned(), sets: Sets::default() };
-    let mut swept = if settings.is_empty() { vec![plain] } else { settings.to_vec() };
-    for (key, words) in sets {
-        let values = values(words);
-        swept = swept
-            .iter()
-            .flat_map(|setting| {
-                values.iter().map(|value| {
-                    let mut with = setting.clone();
-                    with.sets.0.insert(key.clone(), (*value).to_owned());
-                    if values.len() > 1 {
-                        let is_plain = settings.is_empty() && with.name == "profile";
-                        let before = if is_plain { String::new() } else { with.name + " " };
-                        with.name = format!("{before}{key}={value}");
-                    }
-                    with
-                })
-            })
-            .collect();
-    }
-    swept
-}
-
-/// The values between the commas that stand in no bracket and no quotes.
-fn values(words: &str) -> Vec<&str> {
-    let (mut depth, mut quoted, mut from) = (0_i32, false, 0);
-    let mut values = Vec::new();
-    for (at, c) in words.char_indices() {
-        match c {
-            '"' => quoted = !quoted,
-            _ if quoted => {}
-            '[' | '(' | '{' => depth += 1,
-            ']' | ')' | '}' => depth -= 1,
-            ',' if depth == 0 => {
-                values.push(words[from..at].trim());
-                from = at + 1;
-            }
-            _ => {}
-        }
-    }
-    values.push(words[from..].trim());
-    values
-}
-
-fn is_name(name: &str) -> bool {
-    let is_plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.=".contains(&b);
-    (1..=64).contains(&name.len()) && name.bytes().all(is_plain)
-}
-
-fn identity(params: &Params, profiles: &[Vec<Profile>]) -> String {
-    let profiles: Vec<String> = profiles.iter().flatten().map(Profile::to_ron).collect();
+/// Reads the profile of each setting and arm, and returns the study's identity: its version, what
+/// its file says, and all that is in the profiles.
+fn survey(
+    text: &Text,
+    base: &Document,
+    params: &Params,
+    is_enough: &dyn Fn() -> bool,
+) -> Result<String, StudyError> {
+    let mut identity = Fingerprint::default();
+    identity.take(env!("CARGO_PKG_VERSION"));
     // Numbers, texts and words always have a form in JSON.
-    serde_json::to_string(&(env!("CARGO_PKG_VERSION"), params, profiles)).unwrap_or_default()
+    identity.take(&serde_json::to_string(params).unwrap_or_default());
+    let mut known: HashMap<String, &str> = HashMap::new();
+    for setting in &params.settings {
+        let mut of_setting = Fingerprint::default();
+        for arm in &params.arms {
+            if is_enough() {
+                return Err(StudyError::Interrupted);
+            }
+            let profile = read_profile(base, params, setting, arm)?;
+            let task = profile.experiment.task(profile.tick());
+            let built = profile.learner.build(task.feature_names().len(), task.action_limit());
+            built.map_err(|error| StudyError::Learner { error })?;
+            let has_main = profile.session.phases.contains(&Wanted::Main);
+            refuse(text, if has_main { Vec::new() } else { vec![without_main()] })?;
+            of_setting.take(&profile.to_ron());
+        }
+        let word = of_setting.word();
+        identity.take(&word);
+        if let Some(other) = known.insert(word, &setting.name) {
+            let problem = format!(
+                "the settings `{other}` and `{}` are the same, each value: leave one out",
+                setting.name
+            );
+            return Err(StudyError::Sets { problem });
+        }
+    }
+    Ok(identity.word())
+}
+
+fn without_main() -> Wrong {
+    Wrong {
+        key: "sets",
+        message: "session.phases has no main phase".to_owned(),
+        expected: "a main phase in every run".to_owned(),
+    }
 }
 
 #[cfg(test)]

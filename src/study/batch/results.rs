@@ -60,8 +60,9 @@ pub struct Point {
     pub success: f64,
     /// the person's share,
     pub share: f64,
-    /// and what the task is measured by, the mean since the point before.
-    pub value: f64,
+    /// and what the task is measured by, the mean since the point before; none where it is not
+    /// known of any rollout since.
+    pub value: Option<f64>,
 }
 
 /// The values of an agent's table.

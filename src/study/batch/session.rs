@@ -5,7 +5,9 @@
 //! main waits.
 
 use std::path::Path;
+use std::sync::Arc;
 
+use super::StudyError;
 use super::notes::Notes;
 use super::optimum::Optimum;
 use super::params::{Reference, Starts};
@@ -15,11 +17,10 @@ use super::results::{Cells, Done, Row, Table, Trajectory};
 use super::tracks::Tracks;
 use crate::clock::{Pacer, VirtualClock};
 use crate::control::cycle::{Crew, Cycle, Rules};
-use crate::control::witness::Witness;
 use crate::learner::Model;
 use crate::operator::{Choice, Operator, simulated};
 use crate::profile::{Experiment, Profile};
-use crate::record::EpisodeRow;
+use crate::record::{self, EpisodeRow};
 use crate::report::achieved::{Achieved, yardstick};
 use crate::report::metrics;
 use crate::session::Phase;
@@ -37,6 +38,18 @@ pub enum Failure {
     /// It went wrong.
     #[error("{0}")]
     Failed(String),
+    /// The disk refused, as it would the next run.
+    #[error(transparent)]
+    Refused(StudyError),
+}
+
+impl From<record::Error> for Failure {
+    fn from(error: record::Error) -> Self {
+        match StudyError::from(error) {
+            refused @ StudyError::Disk { .. } => Self::Refused(refused),
+            other => Self::Failed(other.to_string()),
+        }
+    }
 }
 
 /// Carries out `run` of `study`; its step rows go to the file `steps`, if that is wanted.
@@ -50,7 +63,7 @@ pub fn perform(
     steps: Option<&Path>,
     is_enough: &dyn Fn() -> bool,
 ) -> Result<Done, Failure> {
-    let mut bench = Bench::new(study, run, is_enough);
+    let mut bench = Bench::new(study, run, is_enough)?;
     match &run.what {
         What::References => bench.references()?,
         What::Session { arm, operator } => {
@@ -63,14 +76,14 @@ pub fn perform(
 /// Where a run is carried out.
 struct Bench<'a> {
     study: &'a Study,
-    profile: &'a Profile,
+    profile: Arc<Profile>,
     seed: u64,
     is_enough: &'a dyn Fn() -> bool,
     done: Done,
 }
 
 impl<'a> Bench<'a> {
-    fn new(study: &'a Study, run: &Run, is_enough: &'a dyn Fn() -> bool) -> Self {
+    fn new(study: &'a Study, run: &Run, is_enough: &'a dyn Fn() -> bool) -> Result<Self, Failure> {
         let done = Done {
             labels: study.labels(run),
             rows: Vec::new(),
@@ -79,7 +92,8 @@ impl<'a> Bench<'a> {
             table: None,
             trajectories: Vec::new(),
         };
-        Self { study, profile: study.profile(run), seed: run.seed, is_enough, done }
+        let profile = study.profile(run).map_err(|error| Failure::Failed(error.to_string()))?;
+        Ok(Self { study, profile, seed: run.seed, is_enough, done })
     }
 
     /// A session, and tests of its policies.
@@ -89,7 +103,7 @@ impl<'a> Bench<'a> {
         operator: &Choice,
         steps: Option<&Path>,
     ) -> Result<(), Failure> {
-        let profile = self.profile;
+        let profile = &*Arc::clone(&self.profile);
         let tick = profile.tick();
         let mut phases = profile.session.clone();
         phases.phases.retain(|phase| *phase != Wanted::Autonomous);
@@ -106,7 +120,7 @@ impl<'a> Bench<'a> {
             task: profile.experiment.task(tick),
             backend: simulated_backend(profile, self.seed),
             operator: steer(operator, profile, self.seed)?,
-            witness: Notes::new(profile, steps).map_err(|why| Failure::Failed(why.to_string()))?,
+            witness: Notes::new(profile, steps)?,
             publisher: None,
         };
         let mut cycle = Cycle::new(rules, crew, fresh, None);
@@ -122,8 +136,11 @@ impl<'a> Bench<'a> {
             }
         }
         let agent = cycle.operator().learned();
-        let outcome = cycle.run(&mut clock);
-        if let Some(why) = outcome.witness.fault().or(outcome.cause) {
+        let mut outcome = cycle.run(&mut clock);
+        if let Some(refused) = outcome.witness.refused() {
+            return Err(refused.into());
+        }
+        if let Some(why) = outcome.cause {
             return Err(Failure::Failed(why));
         }
         if outcome.finish != Finish::Complete {
@@ -131,8 +148,7 @@ impl<'a> Bench<'a> {
         }
         self.conclude(&outcome.sharing, outcome.learned, outcome.refused);
         self.done.table = self.table(operator, &agent);
-        self.done.curve =
-            outcome.witness.close().map_err(|why| Failure::Failed(why.to_string()))?;
+        self.done.curve = outcome.witness.close()?;
         Ok(())
     }
 
@@ -163,7 +179,7 @@ impl<'a> Bench<'a> {
         }
         for readout in &params.readouts {
             for starts in &params.starts {
-                let deputy = deputy(*readout, self.profile, learner, agent);
+                let deputy = deputy(*readout, &self.profile, learner, agent);
                 let driver = Driver { learner: learner.clone(), deputy };
                 self.drive(percent, readout.word(), starts, driver, Phase::Autonomous)?;
             }
@@ -206,12 +222,13 @@ impl<'a> Bench<'a> {
         driver: Driver,
         phase: Phase,
     ) -> Result<(), Failure> {
-        let mut profile = self.profile.clone();
+        let mut profile = Profile::clone(&self.profile);
         profile.session.autonomous_rollouts = starts.count;
         profile.session.starts = if starts.random { Order::Random } else { Order::Grid };
         let params = &self.study.params;
         let is_last = params.starts.last().is_some_and(|last| last.name == starts.name);
-        let is_kept = percent == 100 && (is_last || starts.count == 1);
+        let is_final = percent >= self.study.last_checkpoint();
+        let is_kept = is_final && (is_last || starts.count == 1);
         let kept: &[u32] = match (is_kept, starts.count) {
             (false, _) => &[],
             (true, 1) if !params.trajectories.is_empty() => &[0],

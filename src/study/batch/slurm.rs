@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use crate::profile::shell_word;
+
 /// The processor time that a job should take, s.
 const JOB_S: f64 = 600.0;
 /// The most jobs in an array, which most installations allow.
@@ -62,18 +64,32 @@ impl Array {
     }
 }
 
-/// The script for the study `name`: `words` are the command's after `coadapt study`, `folder` the
-/// one that shards are named after, `program` the path of coadapt.
+/// What a script runs, and where.
+#[derive(Clone, Copy, Debug)]
+pub struct Job<'a> {
+    /// The study's name.
+    pub study: &'a str,
+    /// The folder in which it was asked for: names and paths in it mean what they meant there.
+    pub desk: &'a str,
+    /// The path of coadapt.
+    pub program: &'a str,
+    /// The words after `coadapt study`, as a shell reads them.
+    pub words: &'a str,
+    /// The folder that shards are named after.
+    pub folder: &'a str,
+}
+
+/// The script that runs `job` as `array`, which asks for what was measured.
 #[must_use]
-pub fn script(
-    (name, program): (&str, &str),
-    words: &str,
-    folder: &str,
-    array: Array,
-    need: &Need,
-) -> String {
+pub fn script(job: &Job<'_>, array: Array, need: &Need) -> String {
     let Array { jobs, memory_mib, minutes } = array;
     let Need { mean_s, most_s, memory_mib: used, measured } = need;
+    let is_plain = |c: &char| c.is_alphanumeric() || "-_.".contains(*c);
+    let name: String = job.study.chars().map(|c| if is_plain(&c) { c } else { '_' }).collect();
+    let [desk, program, folder] = [job.desk, job.program, job.folder].map(shell_word);
+    let words = job.words;
+    // A comment ends with its line, whatever is quoted.
+    let told = folder.replace(char::is_control, "?");
     let mut script = String::new();
     // Writing to a text cannot fail.
     let _ = write!(
@@ -82,7 +98,7 @@ pub fn script(
 # The study {name} as an array of {jobs} jobs, one shard each:
 #   sbatch slurm.sh
 # and when all are over:
-#   coadapt study merge '{folder}'-*-of-{jobs} --out '{folder}'
+#   coadapt study merge {told}-*-of-{jobs} --out {told}
 # A job that was cut goes on where it was when it is submitted again.
 # Measured on {measured} run(s): {mean_s:.1} s of processor time on average, {most_s:.1} s at most, {used:.0} MiB.
 #SBATCH --job-name=coadapt-{name}
@@ -91,9 +107,10 @@ pub fn script(
 #SBATCH --cpus-per-task=1
 #SBATCH --mem={memory_mib}M
 #SBATCH --time={minutes}
-exec '{program}' study {words} \\
+cd {desk} || exit 1
+exec {program} study {words} \\
     --shard \"$SLURM_ARRAY_TASK_ID/{jobs}\" --jobs \"${{SLURM_CPUS_PER_TASK:-1}}\" \\
-    --out '{folder}'-\"$SLURM_ARRAY_TASK_ID\"-of-{jobs}
+    --out {folder}-\"$SLURM_ARRAY_TASK_ID\"-of-{jobs}
 "
     );
     script
@@ -110,13 +127,23 @@ mod tests {
         assert_eq!(Array::of(3, &need, Some(99)).jobs, 3, "no job without a run");
         assert_eq!(Array::of(1_000_000, &need, None).jobs, MOST_JOBS);
         let array = Array::of(4, &need, Some(4));
-        let script = script(("x", "/bin/coadapt"), "x --seeds 2", "out/x", array, &need);
+        let job = Job {
+            study: "it's\nmine",
+            desk: "/home/o'neill/a b",
+            program: "/bin/coadapt",
+            words: "'it'\\''s.ron' --seeds 2",
+            folder: "out/x y",
+        };
+        let script = script(&job, array, &need);
         for line in [
             "#SBATCH --array=1-4",
             "#SBATCH --cpus-per-task=1",
             "#SBATCH --mem=128M",
             "--shard \"$SLURM_ARRAY_TASK_ID/4\"",
-            "coadapt study merge 'out/x'-*-of-4 --out 'out/x'",
+            "coadapt study merge 'out/x y'-*-of-4 --out 'out/x y'",
+            "cd '/home/o'\\''neill/a b' || exit 1\n",
+            "exec /bin/coadapt study 'it'\\''s.ron' --seeds 2 ",
+            "#SBATCH --job-name=coadapt-it_s_mine\n",
         ] {
             assert!(script.contains(line), "{line}: {script}");
         }

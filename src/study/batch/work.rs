@@ -66,16 +66,17 @@ pub fn work(runs: &[&Run], desk: &Desk<'_>, perform: &Perform<'_>) -> Result<Tal
         while !ends()
             && let Some(run) = runs.get(next.fetch_add(1, Ordering::Relaxed))
         {
-            let Some(kept) = attempt(run, perform, &ends, desk.memory) else { continue };
-            let failed = match &kept.outcome {
-                Outcome::Failed(why) => Some((run.number, why.clone())),
-                Outcome::Done(_) => None,
+            let kept = attempt(run, perform, &ends, desk.memory)
+                .and_then(|kept| kept.map(|kept| keep(desk.folder, run, kept)).transpose());
+            let failed = match kept {
+                Ok(Some(failed)) => failed.map(|why| (run.number, why)),
+                Ok(None) => continue,
+                Err(error) => {
+                    refused.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+                    is_refused.store(true, Ordering::Relaxed);
+                    return;
+                }
             };
-            if let Err(error) = desk.folder.keep(run.number, &kept) {
-                refused.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
-                is_refused.store(true, Ordering::Relaxed);
-                return;
-            }
             {
                 let mut tally = tally.lock().unwrap_or_else(PoisonError::into_inner);
                 tally.done += usize::from(failed.is_none());
@@ -102,19 +103,36 @@ pub fn work(runs: &[&Run], desk: &Desk<'_>, perform: &Perform<'_>) -> Result<Tal
     Ok(tally)
 }
 
+/// Keeps what came of `run`; returns why it came to nothing, if so. What cannot be written
+/// whatever the disk, such as a number that is not finite, is a failure of this run alone.
+fn keep(folder: &Folder, run: &Run, mut kept: Kept) -> Result<Option<String>, StudyError> {
+    match folder.keep(run.number, &kept) {
+        Err(StudyError::File(error)) => {
+            kept.outcome = Outcome::Failed(error.to_string());
+            folder.keep(run.number, &kept)?;
+        }
+        other => other?,
+    }
+    Ok(match kept.outcome {
+        Outcome::Failed(why) => Some(why),
+        Outcome::Done(_) => None,
+    })
+}
+
 /// Carries out `run`; nothing is kept of one that was given up.
 fn attempt(
     run: &Run,
     perform: &Perform<'_>,
     ends: &dyn Fn() -> bool,
     memory: &dyn Fn() -> Option<f64>,
-) -> Option<Kept> {
+) -> Result<Option<Kept>, StudyError> {
     let before = processor_time();
     // A fault in one run is no reason to lose the others.
     let done = catch_unwind(AssertUnwindSafe(|| perform(run, ends)));
     let outcome = match done {
         Ok(Ok(done)) => Outcome::Done(Box::new(done)),
-        Ok(Err(Failure::Interrupted)) => return None,
+        Ok(Err(Failure::Interrupted)) => return Ok(None),
+        Ok(Err(Failure::Refused(error))) => return Err(error),
         Ok(Err(Failure::Failed(why))) => Outcome::Failed(why),
         Err(panic) => {
             let words = panic
@@ -126,7 +144,7 @@ fn attempt(
     };
     let processor_s = processor_time().zip(before).map(|(after, before)| (after - before).0);
     let version = env!("CARGO_PKG_VERSION").to_owned();
-    Some(Kept { version, outcome, processor_s, memory_mib: memory() })
+    Ok(Some(Kept { version, outcome, processor_s, memory_mib: memory() }))
 }
 
 #[cfg(test)]
@@ -140,7 +158,8 @@ mod tests {
     fn study() -> Study {
         let text = "(profile: \"balance\", arms: [(name: \"a\", mode: sequential)], \
                     operators: [\"none\"], seeds: (count: 7), starts: [(name: \"g\", count: 1)])";
-        Study::of(&Text::new("x", text), Path::new("no-such"), &Changes::default()).unwrap()
+        let nowhere = Path::new("no-such");
+        Study::of(&Text::new("x", text), nowhere, &Changes::default(), &|| false).unwrap()
     }
 
     fn folder(at: &Path, study: &Study) -> Folder {
@@ -196,6 +215,59 @@ mod tests {
             assert_eq!(carry_out(&study, &folder, false, jobs).done, 2);
             assert_eq!(folder.open_runs(&study, Shard::WHOLE), (Vec::new(), 7));
         }
+    }
+
+    #[test]
+    fn a_number_that_is_not_finite_is_a_failure_of_its_run_alone() {
+        let home = tempfile::tempdir().unwrap();
+        let study = study();
+        let folder = folder(home.path(), &study);
+        let (open, _) = folder.open_runs(&study, Shard::WHOLE);
+        let desk = Desk {
+            folder: &folder,
+            jobs: 2,
+            memory: &|| None,
+            told: &|_| {},
+            is_enough: &|| false,
+        };
+        let tally = work(&open, &desk, &|run, _| {
+            let mut done = nothing(&study, run);
+            if run.number == 3 {
+                done.cells.push(crate::study::batch::Cells {
+                    checkpoint: 100,
+                    readout: String::new(),
+                    start: String::new(),
+                    values: vec![f64::INFINITY],
+                    returns: Vec::new(),
+                });
+            }
+            Ok(done)
+        });
+        assert_eq!(tally.unwrap(), Tally { done: 6, failed: 1, left: 0 });
+        let kept = crate::study::batch::read(home.path(), 3).unwrap();
+        assert!(matches!(kept.outcome, Outcome::Failed(why) if why.contains("cells")));
+    }
+
+    #[test]
+    fn what_the_disk_refuses_a_run_stops_all() {
+        let home = tempfile::tempdir().unwrap();
+        let study = study();
+        let folder = folder(home.path(), &study);
+        let (open, _) = folder.open_runs(&study, Shard::WHOLE);
+        let desk = Desk {
+            folder: &folder,
+            jobs: 1,
+            memory: &|| None,
+            told: &|_| {},
+            is_enough: &|| false,
+        };
+        let full = || StudyError::disk("write", Path::new("s"), std::io::Error::other("full"));
+        let refused = work(&open, &desk, &|run, _| match run.number {
+            3 => Err(Failure::Refused(full())),
+            _ => Ok(nothing(&study, run)),
+        });
+        assert!(matches!(refused, Err(StudyError::Disk { .. })));
+        assert_eq!(folder.open_runs(&study, Shard::WHOLE).1, 2);
     }
 
     #[test]
