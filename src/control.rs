@@ -3,6 +3,7 @@
 pub mod cycle;
 mod effects;
 mod learning;
+pub mod recording;
 mod rollout;
 pub mod scale;
 pub mod scribe;
