@@ -1,5 +1,7 @@
 //! The words of the command line.
 
+mod look;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, value_parser};
@@ -8,6 +10,8 @@ use crate::profile::Order;
 use crate::session::BadSubject;
 use crate::session::plan::MOST_ROLLOUTS;
 use crate::study::batch::Shard;
+
+pub use look::{Replay, Watch};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -48,6 +52,8 @@ pub enum Command {
     Study(Study),
     /// A recorded session on the screen once more, or done once more and compared.
     Replay(Replay),
+    /// A session at another terminal, read-only, as it runs.
+    Watch(Watch),
     /// A plant open loop: a table of actions in, a table of states out.
     Simulate(Simulate),
     /// This computer's gamepad for a session at another: lines on standard output.
@@ -283,34 +289,6 @@ pub struct Merge {
     pub out: Option<PathBuf>,
     /// Print one JSON object instead of tables.
     #[arg(long)]
-    pub json: bool,
-}
-
-const REPLAY_HELP: &str = "\
-Examples:
-  coadapt replay logs/S07/001-balance-simultaneous
-  coadapt replay logs/S07/001-balance-simultaneous --verify --json
-
-On the screen: space pauses, . and , step, + and - set the speed (0.1 to 100 times), arrows, Home and
-End go through time, n and p through rollouts, N and P through phases, a number and Enter to that
-rollout; h, m and u show the person's, the robot's and the net action as curves.
-
---verify does the session once more, from its profile, its seed and what its person did, and
-compares every number of its rows bit by bit; the first difference is named. It works on sessions
-that were cut or resumed, with discarded rollouts; not on those of a real plant. Exit code 1: it
-differs.";
-
-/// The words of `replay`.
-#[derive(Args, Debug)]
-#[command(after_help = REPLAY_HELP)]
-pub struct Replay {
-    /// The folder of a session.
-    pub session: PathBuf,
-    /// Do it once more, and compare every number.
-    #[arg(long)]
-    pub verify: bool,
-    /// Print one JSON object instead of sentences.
-    #[arg(long, requires = "verify")]
     pub json: bool,
 }
 

@@ -8,4 +8,5 @@ mod rollout;
 pub mod scale;
 pub mod scribe;
 pub mod snapshot;
+pub mod watch;
 pub mod witness;

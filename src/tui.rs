@@ -26,3 +26,4 @@ pub mod setup;
 pub mod small;
 pub mod terminal;
 pub mod text;
+pub mod watch;

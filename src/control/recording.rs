@@ -364,7 +364,6 @@ struct Known {
     fields: u32,
     /// Rollouts in `episodes.csv` so far.
     rollouts: usize,
-    is_discarded: bool,
 }
 
 impl Default for Known {
@@ -375,7 +374,6 @@ impl Default for Known {
             unfinished: Tallied::default(),
             fields: 0,
             rollouts: 0,
-            is_discarded: false,
         }
     }
 }
@@ -398,9 +396,8 @@ impl Known {
     /// It is over, or breaks off, after these `rows`.
     fn leave(&mut self, rows: &[Row], end: Option<End>, fields: Option<u32>) {
         self.rollouts += usize::from(end.is_some());
-        self.is_discarded = end == Some(End::Discarded);
         // A discard takes back all that came of the rollout.
-        if self.is_discarded {
+        if end == Some(End::Discarded) {
             return;
         }
         rows.iter().for_each(|row| self.regions.see(row));

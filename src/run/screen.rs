@@ -145,10 +145,15 @@ impl Stage {
 
     fn raise_curtain(
         &mut self,
-        session: Session,
+        mut session: Session,
         keys: Keys,
         order: Order,
     ) -> Result<Running, RunError> {
+        // That nobody can watch ends no session.
+        #[cfg(unix)]
+        let post = super::watch::post(&session)
+            .inspect_err(|error| session.notices.push(error.to_string()))
+            .ok();
         // Only now is it known whose keyboard it is, for a resumed session as for a new one.
         keys.hands.set_params(&session.profile().operator.keyboard);
         self.feed.replace(keys.hands, keys.pointer);
@@ -170,7 +175,12 @@ impl Stage {
         let mut clock = self.feed.clock;
         let control = std::thread::Builder::new()
             .name("coadapt-control".to_owned())
-            .spawn(move || session.run(&mut clock, || shutdown.signal()))
+            .spawn(move || {
+                // Who watches sees it up to its last file.
+                #[cfg(unix)]
+                let _post = post;
+                session.run(&mut clock, || shutdown.signal())
+            })
             .map_err(|error| RunError::Failed(format!("no control thread: {error}")))?;
         self.running = Some(control);
         Ok(running)

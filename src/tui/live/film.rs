@@ -81,8 +81,11 @@ fn curve(pen: &mut Pen<'_>, lane: &Lane, film: &Film, limit: f64) {
     let (right, bottom) = (canvas.width(), canvas.height());
     // A dot has room above and below the limits.
     let y_of = |value: f64| (bottom - 1.0) / 2.0 * (1.0 - (value / limit).clamp(-1.0, 1.0));
-    let zero = pen.height() / 2;
-    pen.repeat(0, zero, "·", pen.width(), Role::Dim);
+    let (mut dot, zero) = (0.0, y_of(0.0).floor());
+    while dot < right {
+        canvas.rectangle((dot, zero), (dot + 1.0, zero + 1.0), Role::Dim);
+        dot += 4.0;
+    }
     let step = right / real(film.window.max(1));
     let mut before: Option<f64> = None;
     for (value, at) in lane.values.iter().zip(0_u32..) {
