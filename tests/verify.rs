@@ -18,7 +18,7 @@ use coadapt::run::session::{Company, Keys, Session};
 use coadapt::session::Phase;
 use coadapt::session::machine::Stage;
 use coadapt::signal::Seconds;
-use desk::{Desk, text};
+use desk::{Desk, names, text};
 use serde_json::Value;
 
 const SHORT: &str = "--set session.introduction_rollouts=2 --set session.autonomous_rollouts=2 \
@@ -99,8 +99,8 @@ fn a_session_cut_at_any_byte_is_the_same_up_to_there() {
     let header = steps.iter().position(|byte| *byte == b'\n').unwrap() + 1;
     let cut = desk.at("cut");
     fs::create_dir(&cut).unwrap();
-    for file in ["session.json", "episodes.csv", "policy.json"] {
-        fs::copy(whole.join(file), cut.join(file)).unwrap();
+    for file in names(&whole) {
+        fs::copy(whole.join(&file), cut.join(&file)).unwrap();
     }
     let (length, last) = (steps.len(), header + 1);
     let after_a_row = steps[..length / 2].iter().rposition(|byte| *byte == b'\n').unwrap() + 1;
@@ -117,7 +117,7 @@ fn a_session_cut_at_any_byte_is_the_same_up_to_there() {
     assert_verified(&desk, &cut);
 }
 
-/// Changes the last digit of `column` in the row `line` (from 1, the header) of a table, and
+/// Changes a digit of `column`, the first behind the point, in the row `line` (from 1, the header) of a table, and
 /// returns the number before and after.
 fn flip(file: &Path, line: usize, column: &str) -> (String, String) {
     let text = fs::read_to_string(file).unwrap();
@@ -125,11 +125,10 @@ fn flip(file: &Path, line: usize, column: &str) -> (String, String) {
     let place = lines[0].split(',').position(|name| name == column).unwrap();
     let mut cells: Vec<String> = lines[line - 1].split(',').map(str::to_owned).collect();
     let before = cells[place].clone();
-    let last = before.chars().last().unwrap();
-    let other = char::from_digit((last.to_digit(10).unwrap() + 1) % 10, 10).unwrap();
-    cells[place].pop();
-    cells[place].push(other);
-    let after = cells[place].clone();
+    let at = before.find('.').map_or(before.len() - 1, |point| point + 1);
+    let digit = before[at..].chars().next().unwrap().to_digit(10).unwrap();
+    let after = format!("{}{}{}", &before[..at], (digit + 1) % 10, &before[at + 1..]);
+    cells[place].clone_from(&after);
     lines[line - 1] = cells.join(",");
     fs::write(file, lines.join("\n") + "\n").unwrap();
     (before, after)
@@ -151,7 +150,8 @@ fn a_single_changed_digit_is_named() {
         assert_eq!((&found["phase"], &found["episode"]), (&"main".into(), &2.into()));
         assert_eq!((&found["step"], &found["column"]), (&30.into(), &column.into()), "{found}");
         let same = |cell: &Value, text: &str| {
-            let (a, b): (f64, f64) = (cell.as_str().unwrap().parse().unwrap(), text.parse().unwrap());
+            let (a, b): (f64, f64) =
+                (cell.as_str().unwrap().parse().unwrap(), text.parse().unwrap());
             assert_eq!(a.to_bits(), b.to_bits(), "{cell} {text}");
         };
         same(&found["recorded"], &after);
@@ -253,8 +253,11 @@ fn a_session_with_pauses_stops_and_discarded_rollouts_is_the_same_once_more() {
         .to_vec(),
         ..Order::default()
     };
-    let keys =
-        Keys { hands: Hands::new(&Params::default()), pointer: Pointer::default(), clock: WallClock::start() };
+    let keys = Keys {
+        hands: Hands::new(&Params::default()),
+        pointer: Pointer::default(),
+        clock: WallClock::start(),
+    };
     let session = Session::begin(&order, &Company::Attended(keys)).unwrap();
     let (folder, watcher) = (session.folder().to_owned(), session.watcher.clone());
     let person = thread::spawn(move || impatient(&watcher));
@@ -267,7 +270,7 @@ fn a_session_with_pauses_stops_and_discarded_rollouts_is_the_same_once_more() {
     };
     assert!(discarded("main") >= 2, "{episodes}");
     let events = fs::read_to_string(folder.join("events.csv")).unwrap();
-    assert!(events.contains("go_on") && events.contains("stop"), "{events}");
+    assert!(events.contains("pause") && events.contains("stop"), "{events}");
     assert_verified(&desk, &folder);
 }
 

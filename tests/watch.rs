@@ -21,7 +21,7 @@ use coadapt::record::{EpisodeRow, Sidecar, read_sidecar};
 use coadapt::session::machine::{Finish, Stage};
 use coadapt::session::{Moment, Phase};
 use coadapt::signal::{End, Seconds, Tallied, Tick};
-use desk::{Desk, text};
+use desk::{Desk, names, text};
 
 /// Waits until something is so.
 fn soon(what: &str, mut is: impl FnMut() -> bool) {
@@ -39,7 +39,7 @@ fn sidecar(desk: &Desk) -> Sidecar {
 }
 
 /// A session of our own, and where it is watched.
-struct Stage1 {
+struct Show {
     publisher: Publisher,
     post: Option<Post>,
     place: Place,
@@ -73,7 +73,7 @@ fn rollout(episode: u32) -> EpisodeRow {
     }
 }
 
-impl Stage1 {
+impl Show {
     fn open(desk: &Desk) -> Self {
         let folder = desk.at("sockets");
         let place = Place::at([folder.clone()]);
@@ -98,7 +98,7 @@ impl Stage1 {
 #[test]
 fn only_this_user_may_open_the_socket_and_it_is_gone_afterwards() {
     let desk = Desk::new();
-    let mut session = Stage1::open(&desk);
+    let mut session = Show::open(&desk);
     let socket = session.socket();
     assert_eq!(fs::metadata(&socket).unwrap().permissions().mode() & 0o777, 0o600);
     let folder = fs::metadata(&session.folder).unwrap();
@@ -112,7 +112,7 @@ fn only_this_user_may_open_the_socket_and_it_is_gone_afterwards() {
 #[test]
 fn two_watchers_see_every_rollout_and_the_latest_tick() {
     let desk = Desk::new();
-    let mut session = Stage1::open(&desk);
+    let mut session = Show::open(&desk);
     for episode in 1..=250 {
         session.publisher.rollout(rollout(episode));
     }
@@ -147,7 +147,7 @@ fn two_watchers_see_every_rollout_and_the_latest_tick() {
 #[test]
 fn who_never_reads_holds_up_nobody() {
     let desk = Desk::new();
-    let mut session = Stage1::open(&desk);
+    let mut session = Show::open(&desk);
     let stuck: Vec<UnixStream> =
         (0..3).map(|_| UnixStream::connect(session.socket()).unwrap()).collect();
     for episode in 1..=5000 {
@@ -233,7 +233,6 @@ fn of_several_sessions_one_must_be_named_and_killed_ones_leave_nothing() {
     let desk = Desk::new();
     let mut sessions: Vec<Running> = ["S01", "S02"]
         .map(|subject| {
-            // A countdown of an hour's ticks would be long; this one is only many rollouts.
             let line = format!("{LONG} --subject {subject} --set session.main_rollouts=5000");
             Running(program(&desk, &line).spawn().unwrap())
         })
@@ -248,10 +247,10 @@ fn of_several_sessions_one_must_be_named_and_killed_ones_leave_nothing() {
         session.0.kill().unwrap();
         session.0.wait().unwrap();
     }
-    let names = || fs::read_dir(desk.at("run/coadapt")).unwrap().count();
-    assert_eq!(names(), 2, "a killed program removes nothing");
+    let sockets = || names(&desk.at("run/coadapt")).len();
+    assert_eq!(sockets(), 2, "a killed program removes nothing");
     assert!(Found::all(&place).0.is_empty());
-    assert_eq!(names(), 0);
+    assert_eq!(sockets(), 0);
 }
 
 #[test]

@@ -299,13 +299,18 @@ impl View<'_> {
         }
         match (self.ui.message.as_ref().or(trouble), self.ui.tuned) {
             (Some(message), _) => {
-                pen.text(1, y, &super::text::cut(message, room), Role::Alarm);
+                // Only who has the controls can do something about it.
+                let role = if self.ui.seat.has_controls() { Role::Alarm } else { Role::Strong };
+                pen.text(1, y, &super::text::cut(message, room), role);
             }
             (None, Some(sensitivity)) => {
                 let line = super::sensitivity::line(sensitivity, pen.look.glyphs);
                 pen.text(1, y, &super::text::cut(&line, room), Role::Strong);
             }
             (None, None) => otherwise(pen),
+        }
+        if matches!(self.ui.seat, Seat::Beside) {
+            pen.text_until(pen.width().saturating_sub(1), y, "read-only", Role::Dim);
         }
     }
 }

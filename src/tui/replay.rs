@@ -25,6 +25,8 @@ const SPEEDS: [f64; 10] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0
 const REAL_TIME: usize = 3;
 /// What an arrow key goes on or back, s.
 const SCRUB_S: f64 = 1.0;
+/// Whoever presses a key again within this time means it twice, s.
+const AGAIN_S: f64 = 0.5;
 /// What a curve has room for, s.
 const WINDOW_S: f64 = 10.0;
 /// The longest number of a rollout.
@@ -187,10 +189,10 @@ impl Player {
     /// To this rollout's beginning; from there, to the one before.
     fn turn_back(&mut self) {
         let index = self.recording.span_at(self.row());
-        let begins = self.recording.spans().get(index).is_some_and(|span| {
-            // While it plays on, nobody can press twice at the very first row.
-            real(self.row() - span.first.min(self.row())) * self.info.tick_s < 0.5
-        });
+        let first = self.recording.spans().get(index).map_or(0, |span| span.first);
+        // While it plays on, nobody can press twice at the very first row.
+        let grace_s = if self.is_playing { AGAIN_S * self.speed().max(1.0) } else { 0.0 };
+        let begins = (self.position.floor() - real(first)) * self.info.tick_s <= grace_s;
         self.go_to_span(if begins { index.saturating_sub(1) } else { index });
     }
 

@@ -20,6 +20,8 @@ use crate::signal::Seconds;
 
 /// The time between two pictures.
 const FRAME: Seconds = Seconds(1.0 / 30.0);
+/// How often the last picture is offered.
+const FAREWELLS: u32 = 4;
 /// The most who watch at a time.
 const MOST_WATCHERS: usize = 64;
 /// The most rollouts in a line.
@@ -113,17 +115,27 @@ struct Guest {
 }
 
 impl Desk {
-    /// Serves until the session is over; then shows its last tick to whoever is ready for it.
-    fn serve(mut self, clock: WallClock) {
+    /// Serves until the session is over; then shows its last tick to whoever is ready for it
+    /// soon.
+    fn serve(mut self, mut clock: WallClock) {
         let mut due = clock.now();
         while self.wait(due - clock.now()) {
-            self.welcome();
+            if !self.welcome() {
+                // Whoever could not be taken still knocks.
+                clock.wait_until(clock.now() + FRAME);
+            }
             if clock.now() >= due {
                 self.show();
                 due = clock.now() + FRAME;
             }
         }
-        self.show();
+        for _ in 0..FAREWELLS {
+            self.show();
+            if self.guests.iter().all(|guest| guest.rest.is_empty()) {
+                return;
+            }
+            clock.wait_until(clock.now() + FRAME);
+        }
     }
 
     /// Waits for somebody to come or, where somebody is there, for the next picture's time;
@@ -141,9 +153,14 @@ impl Desk {
         }
     }
 
-    /// Takes those who knock, if they are of this user.
-    fn welcome(&mut self) {
-        while let Ok((stream, _)) = self.listener.accept() {
+    /// Takes those who knock, if they are of this user; false where the system has no room for
+    /// them.
+    fn welcome(&mut self) -> bool {
+        loop {
+            let stream = match self.listener.accept() {
+                Ok((stream, _)) => stream,
+                Err(error) => return error.kind() == ErrorKind::WouldBlock,
+            };
             let is_welcome = self.guests.len() < MOST_WATCHERS
                 && place::is_peer_own(&stream)
                 && stream.set_nonblocking(true).is_ok();
