@@ -89,7 +89,7 @@ impl Recording {
         let mut rows = Vec::new();
         if columns.is_empty() || columns == task.columns() {
             let names: Vec<&str> = task.regions().iter().map(|region| region.name).collect();
-            rows = whole(steps.map(|row| row.map(|row| numbered(row, &names))), &mut trouble);
+            rows = whole(steps.map(|row| row.map(|row| numbered(&row, &names))), &mut trouble);
         } else {
             trouble = Some(format!(
                 "the states in steps.csv are {}, those of {} are {}: it is of another session",
@@ -178,7 +178,9 @@ impl Recording {
         };
         let past = self.rows.get(span.first..=at).unwrap_or_default();
         let mut regions = span.regions;
-        past.iter().for_each(|row| regions.see(row));
+        for row in past {
+            regions.see(row);
+        }
         let region = row.region.map_or_else(|| self.task.region(&row.state), usize::from);
         let moment = Moment { step: row.step, ..span.moment };
         let is_ending = row.u.is_none();
@@ -315,7 +317,7 @@ fn whole<T>(
     .collect()
 }
 
-fn numbered(row: StepRow<String>, names: &[&str]) -> Row {
+fn numbered(row: &StepRow<String>, names: &[&str]) -> Row {
     let index = |name: &String| names.iter().position(|known| known == name);
     let region = row.region.as_ref().and_then(index).and_then(|index| u8::try_from(index).ok());
     StepRow {
@@ -400,7 +402,9 @@ impl Known {
         if end == Some(End::Discarded) {
             return;
         }
-        rows.iter().for_each(|row| self.regions.see(row));
+        for row in rows {
+            self.regions.see(row);
+        }
         self.fields = fields.unwrap_or(self.fields);
         let steps = rows.last().map_or(0, |row| row.step);
         self.moment.steps_before += u64::from(steps);

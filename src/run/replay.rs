@@ -96,7 +96,7 @@ pub(super) fn shown(
 
 /// The JSON object of `replay --verify`.
 #[derive(Serialize)]
-struct Verified<'a> {
+struct Object<'a> {
     schema: u32,
     session: String,
     /// Whether every row is the same.
@@ -141,7 +141,7 @@ fn checked(
     let is_same = verdict.difference.is_none() && refused.is_none();
     let partial = sidecar.status != Status::Complete;
     if words.json {
-        let object = Verified {
+        let object = Object {
             schema: 1,
             session: folder.display().to_string(),
             verified: is_same,

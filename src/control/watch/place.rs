@@ -93,7 +93,7 @@ fn own(folder: &Path) -> io::Result<()> {
         _ => {}
     }
     let facts = fs::symlink_metadata(folder)?;
-    if facts.is_dir() && facts.uid() == geteuid().as_raw() && facts.mode() & 0o077 != 0 {
+    if facts.is_dir() && facts.uid() == geteuid().as_raw() && facts.mode() & 0o777 != 0o700 {
         fs::set_permissions(folder, Permissions::from_mode(0o700))?;
     }
     is_own(folder)
@@ -103,7 +103,7 @@ fn own(folder: &Path) -> io::Result<()> {
 fn is_own(folder: &Path) -> io::Result<()> {
     let facts = fs::symlink_metadata(folder)?;
     let is_ours = facts.is_dir() && facts.uid() == geteuid().as_raw();
-    if is_ours && facts.mode() & 0o077 == 0 {
+    if is_ours && facts.mode() & 0o777 == 0o700 {
         return Ok(());
     }
     Err(io::Error::new(io::ErrorKind::PermissionDenied, "others may enter it, or made it"))
@@ -181,7 +181,7 @@ mod tests {
         drop(UnixListener::bind(&dead).unwrap());
         let listener = UnixListener::bind(&alive).unwrap();
         fs::write(folder.join("notes.txt"), "").unwrap();
-        assert_eq!(place.sockets(), [alive.clone()]);
+        assert_eq!(place.sockets(), std::slice::from_ref(&alive));
         assert!(!dead.exists());
         drop(listener);
         // Its program lives: it may be about to listen.

@@ -62,8 +62,7 @@ pub fn show(
                         break;
                     }
                 }
-                Heard::Event(_) => break,
-                Heard::Nothing => break,
+                Heard::Event(_) | Heard::Nothing => break,
                 Heard::Lost => return End::Lost,
             }
         }
