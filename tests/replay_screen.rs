@@ -193,9 +193,9 @@ fn a_replay_in_the_middle_of_main() {
     let mut player = player();
     press(&mut player, "N2\r>>>>>>>>>>>> ");
     both("replay_main", &player);
-    press(&mut player, "hm");
+    press(&mut player, "yr");
     insta::assert_snapshot!("replay_one_curve_80x24", picture(&player, (80, 24)));
-    press(&mut player, "u?");
+    press(&mut player, "m?");
     insta::assert_snapshot!("replay_help_80x24", picture(&player, (80, 24)));
     press(&mut player, "?v");
     insta::assert_snapshot!("replay_subject_80x24", picture(&player, (80, 24)));

@@ -11,7 +11,7 @@ Examples:
 
 On the screen: space pauses, . and , step, + and - set the speed (0.1 to 100 times), arrows, Home and
 End go through time, n and p through rollouts, N and P through phases, a number and Enter to that
-rollout; h, m and u show the person's, the robot's and the net action as curves.
+rollout; y, r and m show the person's, the robot's and the net action as curves.
 
 --verify does the session once more, from its profile, its seed and what its person did, and
 compares every number of its rows bit by bit; the first difference is named. It works on sessions
