@@ -1,5 +1,7 @@
 //! The words of the command line.
 
+mod look;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, value_parser};
@@ -9,6 +11,8 @@ use crate::session::BadSubject;
 use crate::session::plan::MOST_ROLLOUTS;
 use crate::study::batch::Shard;
 
+pub use look::{Replay, Watch};
+
 const EXAMPLES: &str = "\
 Examples:
   coadapt                                       set up a session on the screen
@@ -17,6 +21,7 @@ Examples:
   coadapt run --headless --resume logs/S07/001-balance-simultaneous
   coadapt fit data.csv --inputs a,b --outputs u a learner on a table, offline
   coadapt study balance                         many simulated sessions, compared
+  coadapt replay logs/S07/001-balance-simultaneous   watch it again; --verify compares
   coadapt profile show balance                  every key, its value and its origin
   coadapt devices                               pads, ports, terminal; maps a gamepad
 
@@ -45,6 +50,10 @@ pub enum Command {
     Fit(Fit),
     /// Many sessions, compared: arms × operators × seeds × settings, on all cores.
     Study(Study),
+    /// A recorded session on the screen once more, or done once more and compared.
+    Replay(Replay),
+    /// A session at another terminal, read-only, as it runs.
+    Watch(Watch),
     /// A plant open loop: a table of actions in, a table of states out.
     Simulate(Simulate),
     /// This computer's gamepad for a session at another: lines on standard output.

@@ -3,8 +3,10 @@
 pub mod cycle;
 mod effects;
 mod learning;
+pub mod recording;
 mod rollout;
 pub mod scale;
 pub mod scribe;
 pub mod snapshot;
+pub mod watch;
 pub mod witness;

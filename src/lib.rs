@@ -41,7 +41,7 @@
 //! | `control` | the control cycle, and what others see of it | `clock`, `plant`, `learner`, `sharing`, `teaching`, `session`, `operator`, `task`, `backend`, `record` |
 //! | `report` | measures, figures, statistics | `record`, `task`, `learner`, `session`, `sharing` |
 //! | `study` | many runs without a screen | `clock`, `plant`, `learner`, `sharing`, `teaching`, `session`, `operator`, `task`, `backend`, `record`, `profile`, `control`, `report` |
-//! | `tui` | screens that draw plain data | `control::snapshot`, `report`, `record`, `profile`, `session`, `task`, `operator`, `backend`, `sharing`, `learner`, `clock`, `host` |
+//! | `tui` | screens that draw plain data | `control::snapshot`, `control::recording`, `report`, `record`, `profile`, `session`, `task`, `operator`, `backend`, `sharing`, `learner`, `clock`, `host` |
 //! | `cli` | the words of the command line | `learner`, `sharing`, `session`, `operator`, `backend`, `record`, `profile`, `study` |
 //! | `run` | where everything is put together | every room above |
 //! | `main` | the doorbell | `cli`, `run` |

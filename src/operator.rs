@@ -4,6 +4,7 @@ pub mod badge;
 mod choice;
 pub mod gamepad;
 pub mod mouse;
+pub mod playback;
 pub mod q_learning;
 pub mod script;
 pub mod shaping;

@@ -14,10 +14,13 @@ pub mod outcome;
 mod pad_relay;
 mod panics;
 mod plant;
+mod replay;
 mod screen;
 pub mod session;
 mod shutdown;
 mod study;
+#[cfg(unix)]
+mod watch;
 mod words;
 
 use std::io::{self, IsTerminal, Write};
@@ -82,6 +85,13 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Evaluate(words)) => evaluate::evaluate(words),
         Some(Command::Fit(words)) => fit::fit(words),
         Some(Command::Study(words)) => study::study(words),
+        Some(Command::Replay(words)) => replay::replay(words),
+        #[cfg(unix)]
+        Some(Command::Watch(words)) => watch::watch(words),
+        #[cfg(not(unix))]
+        Some(Command::Watch(_)) => {
+            Err(RunError::Usage("this system has no Unix sockets to watch through".to_owned()))
+        }
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::PadRelay(words)) => pad_relay::pad_relay(words),
         #[cfg(unix)]
@@ -115,6 +125,9 @@ fn headless(run: &crate::cli::Run) -> Result<ExitCode, RunError> {
         tell(notice);
     }
     shutdown.abort_on_signal(session.watcher.clone());
+    // That nobody can watch ends no session.
+    #[cfg(unix)]
+    let _post = watch::post(&session).inspect_err(|error| tell(&format!("{error}"))).ok();
     let finished = session.run(&mut VirtualClock::default(), || shutdown.signal())?;
     if run.json {
         let json = serde_json::to_string(&finished.results)

@@ -15,7 +15,8 @@ use coadapt::session::{Moment, Phase};
 use coadapt::sharing::weight::Opened;
 use coadapt::signal::{End, Intent, Seconds, State, Tallied, Tick};
 use coadapt::task::swing_up;
-use coadapt::tui::live::{self, History, Info, Ui, View};
+use coadapt::tui::live::film::{Film, Lane};
+use coadapt::tui::live::{self, History, Info, Seat, Ui, View};
 use coadapt::tui::palette::{Glyphs, Look, Palette, Role};
 use coadapt::tui::plant::Badge;
 use coadapt::tui::results;
@@ -761,7 +762,19 @@ proptest! {
         snapshot.region = region;
         snapshot.learned = u64::MAX;
         let glyphs = [Glyphs::Braille, Glyphs::Half, Glyphs::Ascii][usize::from(glyphs)];
+        let lane = |label, role| Lane { label, role, values: vec![Some(x), None, Some(applied)] };
+        let film = Film {
+            speed,
+            position_s: x,
+            length_s: v,
+            borders: vec![share, success],
+            lanes: vec![lane("you", Role::You), lane("robot", Role::Robot)],
+            window: region % 9,
+            end: Some("字".repeat(60)),
+            ..Film::default()
+        };
         let ui = Ui {
+            seat: [Seat::Controls, Seat::Beside, Seat::Replay(film)][usize::from(flags) % 3].clone(),
             show_progress: flags & 1 == 0,
             subject_view: flags & 2 == 0,
             help_open: flags & 4 == 0,

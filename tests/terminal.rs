@@ -678,3 +678,57 @@ fn questions_to_the_terminal_do_not_get_into_what_is_piped() {
     assert_eq!(devices["terminal"]["key_releases"], true);
     assert!(terminal.wrote("\x1b[?u"), "the terminal was not asked");
 }
+
+#[test]
+fn a_second_terminal_watches_one_session_after_the_other() {
+    let run = tempfile::tempdir().unwrap();
+    let folder: &'static str = run.path().display().to_string().leak();
+    let seat = || Seat { variables: vec![("XDG_RUNTIME_DIR", folder)], ..Seat::default() };
+    let mut watcher = seat().open("watch anon");
+    watcher.shows("nothing to watch yet");
+    for _ in 0..2 {
+        let mut session = seat().open(CALM);
+        session.shows("Enter   begin");
+        watcher.shows_that("the instruction", |screen| {
+            screen.contains("MAIN") && !screen.contains("begin") && screen.contains("read-only")
+        });
+        session.keys("\r");
+        session.goes();
+        watcher.goes();
+        // What is typed there moves nothing here.
+        watcher.keys(" x");
+        session.keys("\x1b[C");
+        watcher.shows_that("a push", |screen| push(screen).is_some_and(|n| n > 0.0));
+        end(&session);
+        assert_eq!(session.code(), 0);
+        watcher.shows("this session is over; the next one is awaited");
+    }
+    watcher.keys("q");
+    assert_eq!(watcher.code(), 0);
+    watcher.is_given_back();
+}
+
+#[test]
+fn a_recorded_session_is_replayed_on_a_terminal() {
+    let session = "logs/anon/001-balance-simultaneous";
+    let desk = tempfile::tempdir().unwrap();
+    let line = "run balance --headless --operator simulated:average --seed 1 --rollouts 2 \
+        --set session.introduction_rollouts=1 --set session.autonomous_rollouts=1";
+    let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_coadapt"));
+    program.args(line.split_whitespace()).current_dir(desk.path());
+    assert!(program.output().unwrap().status.success());
+    let seat = Seat { desk: Some(desk), ..Seat::default() };
+    let mut terminal = seat.open(&format!("replay {session}"));
+    terminal.shows("PLAY");
+    terminal.keys(" ");
+    terminal.shows("PAUSE");
+    terminal.keys("N");
+    terminal.shows("1/2");
+    terminal.keys("2\r");
+    terminal.shows("2/2");
+    terminal.keys("\x1b[F");
+    terminal.shows("ZERO CONTROL");
+    terminal.keys("q");
+    assert_eq!(terminal.code(), 0);
+    terminal.is_given_back();
+}

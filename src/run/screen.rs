@@ -19,8 +19,8 @@ use crate::clock::WallClock;
 use crate::operator::mouse::Pointer;
 use crate::operator::terminal::{self, Hands};
 use crate::operator::{Choice, Device, Via};
-use crate::profile::{self, Document, Order, ProfileError};
-use crate::record::{self, folder};
+use crate::profile::{self, Document, Order, Profile, ProfileError};
+use crate::record::{self, Sidecar, folder};
 use crate::session::Phase;
 use crate::session::plan::Plan;
 use crate::sharing::{self, Mode};
@@ -145,15 +145,20 @@ impl Stage {
 
     fn raise_curtain(
         &mut self,
-        session: Session,
+        mut session: Session,
         keys: Keys,
         order: Order,
     ) -> Result<Running, RunError> {
+        // That nobody can watch ends no session.
+        #[cfg(unix)]
+        let post = super::watch::post(&session)
+            .inspect_err(|error| session.notices.push(error.to_string()))
+            .ok();
         // Only now is it known whose keyboard it is, for a resumed session as for a new one.
         keys.hands.set_params(&session.profile().operator.keyboard);
         self.feed.replace(keys.hands, keys.pointer);
         let running = Running {
-            info: info(&session),
+            info: info_of(session.profile(), session.sidecar()),
             watcher: session.watcher.clone(),
             frames: session.frames.clone(),
             badge: session.device.as_ref().map(|device| device.badge.clone()),
@@ -170,7 +175,12 @@ impl Stage {
         let mut clock = self.feed.clock;
         let control = std::thread::Builder::new()
             .name("coadapt-control".to_owned())
-            .spawn(move || session.run(&mut clock, || shutdown.signal()))
+            .spawn(move || {
+                // Who watches sees it up to its last file.
+                #[cfg(unix)]
+                let _post = post;
+                session.run(&mut clock, || shutdown.signal())
+            })
             .map_err(|error| RunError::Failed(format!("no control thread: {error}")))?;
         self.running = Some(control);
         Ok(running)
@@ -248,7 +258,7 @@ fn hands() -> Hands {
 
 /// How the mouse is to be read over the live screen: only by a session that it steers.
 fn mouse(session: &Session) -> Mouse {
-    match device(session) {
+    match device(session.sidecar()) {
         Some(Device::Mouse) if session.profile().operator.mouse.hide_pointer => Mouse::Hidden,
         Some(Device::Mouse) => Mouse::Read,
         _ => Mouse::Unread,
@@ -256,16 +266,15 @@ fn mouse(session: &Session) -> Mouse {
 }
 
 /// The device that the person has a hand on.
-fn device(session: &Session) -> Option<Device> {
-    session.sidecar().operator.parse::<Choice>().ok().and_then(|choice| choice.device())
+fn device(sidecar: &Sidecar) -> Option<Device> {
+    sidecar.operator.parse::<Choice>().ok().and_then(|choice| choice.device())
 }
 
 /// The facts of a session for the live screen.
-fn info(session: &Session) -> Info {
-    let (profile, sidecar) = (session.profile(), session.sidecar());
+pub(super) fn info_of(profile: &Profile, sidecar: &Sidecar) -> Info {
     let task = profile.experiment.task(profile.tick());
     let plan = Plan::new(&profile.session, profile.tick(), sidecar.seed, true);
-    let device = device(session);
+    let device = device(sidecar);
     let texts = &profile.session.instructions;
     let main = match sidecar.mode {
         Mode::Simultaneous => &texts.simultaneous,

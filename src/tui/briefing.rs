@@ -25,7 +25,8 @@ pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
         Stage::Break { next, ticks_left } => rest(pen, view, next, ticks_left),
         _ => {}
     }
-    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Briefing, Hand::Absent));
+    let screen = if view.ui.seat.has_controls() { Screen::Briefing } else { Screen::Watch };
+    view.message_or(pen, last, |pen| help::hints(pen, last, screen, Hand::Absent));
 }
 
 fn instruction(pen: &mut Pen<'_>, view: &View<'_>, moment: Moment) {
@@ -50,7 +51,7 @@ fn instruction(pen: &mut Pen<'_>, view: &View<'_>, moment: Moment) {
         pen.text(left, y, &line, Role::Alarm);
         y += 1;
     }
-    button(pen, y + 1, "Enter   begin");
+    button(pen, view, y + 1, "Enter   begin");
 }
 
 fn rest(pen: &mut Pen<'_>, view: &View<'_>, next: Moment, ticks_left: u32) {
@@ -62,7 +63,7 @@ fn rest(pen: &mut Pen<'_>, view: &View<'_>, next: Moment, ticks_left: u32) {
     let whole = view.info.break_s.max(seconds).max(1.0);
     let mut line = pen.part((pen.width().saturating_sub(44)) / 2, top + 5, 44, 1);
     strip::countdown(&mut line, ("rest", Role::Text), seconds, whole, 0);
-    button(pen, top + 8, "Enter   go on now");
+    button(pen, view, top + 8, "Enter   go on now");
 }
 
 fn heading(pen: &mut Pen<'_>, view: &View<'_>, y: u16, phase: Phase) {
@@ -75,7 +76,11 @@ fn heading(pen: &mut Pen<'_>, view: &View<'_>, y: u16, phase: Phase) {
     pen.centred(y + 1, &about, Role::Dim);
 }
 
-fn button(pen: &mut Pen<'_>, y: u16, words: &str) {
+/// What to press, for whoever may.
+fn button(pen: &mut Pen<'_>, view: &View<'_>, y: u16, words: &str) {
+    if !view.ui.seat.has_controls() {
+        return;
+    }
     let width = super::pen::columns(words) + 6;
     let left = pen.width().saturating_sub(width) / 2;
     let mut button = pen.part(left, y, width, 3);

@@ -8,6 +8,9 @@ use super::text::wrapped;
 /// The width of the page, its border included.
 const WIDTH: u16 = 72;
 
+/// What Ctrl-C does wherever there may be something to save.
+const QUITS: &str = "stop, save and quit";
+
 /// Draws the keys of `screen`, for `hand`, and `notes` over what is there.
 pub fn draw(pen: &mut Pen<'_>, screen: Screen, hand: Hand, notes: &[String]) {
     let bindings: Vec<_> = keys::of(screen).filter(|b| !b.shown.is_empty()).collect();
@@ -29,7 +32,8 @@ pub fn draw(pen: &mut Pen<'_>, screen: Screen, hand: Hand, notes: &[String]) {
         y += 1;
     }
     page.text(0, y, "Ctrl-C", Role::Strong);
-    page.text(shown + 3, y, "stop, save and quit", Role::Text);
+    let quits = if matches!(screen, Screen::Replay | Screen::Watch) { "quit" } else { QUITS };
+    page.text(shown + 3, y, quits, Role::Text);
     y += 2;
     for line in lines {
         page.text(0, y, &line, Role::Dim);

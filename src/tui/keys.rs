@@ -19,12 +19,24 @@ pub enum Screen {
     Devices,
     /// The real plant of a session.
     Plant,
+    /// A recorded session.
+    Replay,
+    /// A session at another terminal.
+    Watch,
 }
 
 impl Screen {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Setup, Self::Briefing, Self::Live, Self::Results, Self::Devices, Self::Plant];
+    pub const ALL: [Self; 8] = [
+        Self::Setup,
+        Self::Briefing,
+        Self::Live,
+        Self::Results,
+        Self::Devices,
+        Self::Plant,
+        Self::Replay,
+        Self::Watch,
+    ];
 
     /// The heading in the help.
     #[must_use]
@@ -36,6 +48,8 @@ impl Screen {
             Self::Results => "results",
             Self::Devices => "devices",
             Self::Plant => "plant",
+            Self::Replay => "replay",
+            Self::Watch => "watch",
         }
     }
 }
@@ -97,6 +111,26 @@ pub enum Action {
     No,
     /// The fault was seen; or end a calibration.
     Clear,
+    /// A step of a recording on,
+    StepOn,
+    /// or back.
+    StepBack,
+    /// Slower, down to a tenth.
+    Slower,
+    /// To a recording's beginning,
+    First,
+    /// or its end.
+    Last,
+    /// A digit of a rollout's number.
+    Digit,
+    /// Forget what was typed.
+    Forget,
+    /// Show or hide the curve of the person's action,
+    Human,
+    /// the robot's,
+    Machine,
+    /// and what the plant got of both.
+    Net,
     /// Show or hide the keys.
     Help,
     /// Leave; asked once more during a session.
@@ -157,8 +191,11 @@ const fn elsewhere(
 /// All keys of all screens. `Ctrl-C` is [`Action::QuitNow`] everywhere.
 pub const BINDINGS: &[Binding] = {
     use Action as A;
-    use KeyCode::{BackTab, Char, Down, Enter, Esc, F, Left, Right, Tab, Up};
-    use Screen::{Briefing, Devices, Live, Plant, Results, Setup};
+    use KeyCode::{
+        BackTab, Backspace, Char, Down, End, Enter, Esc, F, Home, Left, PageDown, PageUp,
+    };
+    use KeyCode::{Right, Tab, Up};
+    use Screen::{Briefing, Devices, Live, Plant, Replay, Results, Setup, Watch};
     &[
         bind(Setup, &[Tab, Down], "Tab ↓", "next", "to the next field", A::Next),
         bind(Setup, &[BackTab, Up], "Shift-Tab ↑", "", "to the field before", A::Previous),
@@ -233,6 +270,73 @@ pub const BINDINGS: &[Binding] = {
         bind(Plant, &[Char('o'), Esc], "o", "scene", "back to the scene; also Esc", A::Plant),
         bind(Plant, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
         bind(Plant, &[Char('q')], "q", "end", "end the session (asks once)", A::Quit),
+        //
+        bind(Replay, &[Char(' ')], "space", "pause", "pause, or go on", A::Pause),
+        bind(Replay, &[Char('.')], ". ,", "step", "a step on, or back", A::StepOn),
+        bind(Replay, &[Char(',')], "", "", "a step back", A::StepBack),
+        bind(Replay, &[Right], "← →", "1 s", "a second back, or on", A::Right),
+        bind(Replay, &[Left], "", "", "a second back", A::Left),
+        bind(Replay, &[Home], "Home End", "", "the beginning, the end", A::First),
+        bind(Replay, &[End], "", "", "the end", A::Last),
+        bind(
+            Replay,
+            &[Char('+'), Char('=')],
+            "+ -",
+            "speed",
+            "0.1 to 100 times as fast",
+            A::Faster,
+        ),
+        bind(Replay, &[Char('-')], "", "", "slower", A::Slower),
+        bind(Replay, &[Char('n')], "n p", "rollout", "the next rollout, the one before", A::Next),
+        bind(Replay, &[Char('p')], "", "", "the rollout before", A::Previous),
+        bind(
+            Replay,
+            &[PageDown, Char('N')],
+            "N P",
+            "",
+            "the next phase, the one before; also PageDown",
+            A::Down,
+        ),
+        bind(Replay, &[PageUp, Char('P')], "", "", "the phase before", A::Up),
+        bind(
+            Replay,
+            &[
+                Char('0'),
+                Char('1'),
+                Char('2'),
+                Char('3'),
+                Char('4'),
+                Char('5'),
+                Char('6'),
+                Char('7'),
+                Char('8'),
+                Char('9'),
+            ],
+            "12 Enter",
+            "",
+            "to the phase's rollout of that number",
+            A::Digit,
+        ),
+        bind(Replay, &[Enter], "", "", "go there", A::Begin),
+        bind(Replay, &[Esc, Backspace], "", "", "forget the number", A::Forget),
+        bind(
+            Replay,
+            &[Char('y')],
+            "y r m",
+            "",
+            "curves of you, the robot, the motor (net)",
+            A::Human,
+        ),
+        bind(Replay, &[Char('r')], "", "", "the robot's action", A::Machine),
+        bind(Replay, &[Char('m')], "", "", "the net action", A::Net),
+        bind(Replay, &[Char('v')], "v", "", "the subject's view, or all", A::SubjectView),
+        bind(Replay, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
+        bind(Replay, &[Char('q')], "q", "quit", "quit", A::Quit),
+        //
+        bind(Watch, &[Char('v')], "v", "view", "the subject's view, or all", A::SubjectView),
+        bind(Watch, &[Char('p')], "p", "progress", "show or hide share and success", A::Progress),
+        bind(Watch, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
+        bind(Watch, &[Char('q'), Esc], "q", "quit", "quit; the session goes on", A::Quit),
     ]
 };
 
@@ -267,6 +371,8 @@ pub fn action(screen: Screen, event: KeyEvent) -> Option<Action> {
             | Action::Down
             | Action::MoreSensitive
             | Action::LessSensitive
+            | Action::StepOn
+            | Action::StepBack
     );
     (event.kind == KeyEventKind::Press || repeats).then_some(found)
 }
@@ -293,7 +399,7 @@ pub fn hints(screen: Screen, hand: Hand) -> impl Iterator<Item = (&'static str, 
     let fits = move |binding: &&Binding| match binding.action {
         None => matches!(hand, Hand::On(_)),
         Some(Action::Discard) => hand != Hand::Nobody,
-        Some(Action::Faster) => hand == Hand::Nobody,
+        Some(Action::Faster) => screen == Screen::Replay || hand == Hand::Nobody,
         Some(_) => true,
     };
     of(screen)

@@ -1,6 +1,7 @@
 //! The live screen: the plant at a glance, the session's state in fixed places below it.
 
 mod facts;
+pub mod film;
 mod map;
 mod overlay;
 mod panels;
@@ -20,6 +21,7 @@ use crate::report::metrics;
 use crate::session::Phase;
 use crate::session::machine::{Finish, Stage};
 use crate::session::plan::PhasePlan;
+use film::Film;
 
 /// What stays the same during a session.
 #[derive(Clone, Debug, PartialEq)]
@@ -120,9 +122,40 @@ impl History {
     }
 }
 
+/// From where a session is seen.
+#[derive(Clone, Debug, Default)]
+pub enum Seat {
+    /// At its controls.
+    #[default]
+    Controls,
+    /// At another terminal, while it runs.
+    Beside,
+    /// Afterwards, from what was recorded.
+    Replay(Film),
+}
+
+impl Seat {
+    /// Whose keys are heard there.
+    const fn screen(&self) -> Screen {
+        match self {
+            Self::Controls => Screen::Live,
+            Self::Beside => Screen::Watch,
+            Self::Replay(_) => Screen::Replay,
+        }
+    }
+
+    /// Whether what is pressed there moves the session.
+    #[must_use]
+    pub const fn has_controls(&self) -> bool {
+        matches!(self, Self::Controls)
+    }
+}
+
 /// The state of the screen itself.
 #[derive(Clone, Debug)]
 pub struct Ui {
+    /// Who looks.
+    pub seat: Seat,
     /// Whether share and success are shown.
     pub show_progress: bool,
     /// Whether only the scene is shown.
@@ -146,6 +179,7 @@ pub struct Ui {
 impl Default for Ui {
     fn default() -> Self {
         Self {
+            seat: Seat::Controls,
             show_progress: true,
             subject_view: false,
             help_open: false,
@@ -211,6 +245,7 @@ impl View<'_> {
     #[must_use]
     pub fn hand(&self) -> Hand {
         match self.info.device {
+            _ if !self.ui.seat.has_controls() => Hand::Nobody,
             _ if !self.phase().is_steered() => Hand::Nobody,
             Some(device) => Hand::On(device),
             None => Hand::Absent,
@@ -255,15 +290,27 @@ impl View<'_> {
         let has_box =
             steered && matches!(self.panel.stage, Stage::Paused(_) | Stage::Instruction(_));
         let trouble = self.ui.trouble.as_ref().filter(|_| !has_box);
+        if let Seat::Replay(Film { typed, .. }) = &self.ui.seat
+            && !typed.is_empty()
+        {
+            let line = format!("to rollout {typed}_   Enter goes there, Esc does not");
+            pen.text(1, y, &line, Role::Strong);
+            return;
+        }
         match (self.ui.message.as_ref().or(trouble), self.ui.tuned) {
             (Some(message), _) => {
-                pen.text(1, y, &super::text::cut(message, room), Role::Alarm);
+                // Only who has the controls can do something about it.
+                let role = if self.ui.seat.has_controls() { Role::Alarm } else { Role::Strong };
+                pen.text(1, y, &super::text::cut(message, room), role);
             }
             (None, Some(sensitivity)) => {
                 let line = super::sensitivity::line(sensitivity, pen.look.glyphs);
                 pen.text(1, y, &super::text::cut(&line, room), Role::Strong);
             }
             (None, None) => otherwise(pen),
+        }
+        if matches!(self.ui.seat, Seat::Beside) {
+            pen.text_until(pen.width().saturating_sub(1), y, "read-only", Role::Dim);
         }
     }
 }
@@ -302,7 +349,10 @@ fn page(pen: &mut Pen<'_>, view: &View<'_>) {
         everything(pen, view);
     }
     if view.ui.help_open {
-        let screen = if is_briefing { Screen::Briefing } else { Screen::Live };
+        let screen = match &view.ui.seat {
+            Seat::Controls if is_briefing => Screen::Briefing,
+            seat => seat.screen(),
+        };
         help::draw(pen, screen, view.hand(), &notes(view));
     }
 }
@@ -313,12 +363,18 @@ fn everything(pen: &mut Pen<'_>, view: &View<'_>) {
     strip::phases(&mut pen.part(0, 1, width, 1), view);
     let rows = height - 2 - PANEL_ROWS;
     let beside = map::width(view.info, width);
-    scene(&mut pen.part(0, 2, width - beside, rows), view);
-    map::draw(&mut pen.part(width - beside, 2, beside, rows), view);
-    pen.rule(2 + rows);
+    let (seat, info) = (&view.ui.seat, view.info);
+    let lanes = film::height(seat, rows);
+    film::lanes(&mut pen.part(0, 2, width, lanes), seat, info.action_limit, &info.action_unit);
+    scene(&mut pen.part(0, 2 + lanes, width - beside, rows - lanes), view);
+    map::draw(&mut pen.part(width - beside, 2 + lanes, beside, rows - lanes), view);
+    match seat {
+        Seat::Replay(film) => film::timeline(&mut pen.part(0, 2 + rows, width, 1), film),
+        Seat::Controls | Seat::Beside => pen.rule(2 + rows),
+    }
     panels::draw(&mut pen.part(0, 3 + rows, width, PANEL_ROWS - 2), view);
     let last = height - 1;
-    view.message_or(pen, last, |pen| help::hints(pen, last, Screen::Live, view.hand()));
+    view.message_or(pen, last, |pen| help::hints(pen, last, seat.screen(), view.hand()));
     overlay::draw(&mut pen.part(0, 2, width, rows), view);
 }
 
@@ -348,6 +404,12 @@ fn scene(pen: &mut Pen<'_>, view: &View<'_>) {
     if let Some(motor) = &view.ui.motor {
         pen.text(1, 0, &motor.words, motor.role);
     }
+    if let Seat::Replay(film) = &view.ui.seat {
+        if let Some(end) = &film.end {
+            pen.centred(height - 1, end, Role::Strong);
+        }
+        return;
+    }
     if let Stage::Hold { moment, ticks_left } = view.scene.stage {
         if let Some(waits) = &view.ui.waits {
             let line = super::text::cut(&format!("WAIT  {waits}"), usize::from(width));
@@ -367,6 +429,15 @@ fn notes(view: &View<'_>) -> Vec<String> {
     let info = view.info;
     let gate = super::text::fixed(info.gate * 100.0, 0, 0);
     let mut notes = Vec::new();
+    match view.ui.seat {
+        Seat::Controls => {}
+        Seat::Beside => {
+            return vec!["You only look on: nothing here moves the session.".to_owned()];
+        }
+        Seat::Replay(_) => {
+            return vec!["Countdowns, breaks and pauses are not recorded.".to_owned()];
+        }
+    }
     if view.ui.motor.is_some() {
         notes.push("o opens the page of the plant: arm, home, calibrate.".to_owned());
     }

@@ -23,7 +23,10 @@ pub fn draw(pen: &mut Pen<'_>, view: Option<&View<'_>>) {
     let mut lines = vec![(size, Role::Strong)];
     if let Some(view) = view {
         let snapshot = view.panel;
-        lines.push(("control goes on and is safe".to_owned(), Role::Text));
+        let has_controls = view.ui.seat.has_controls();
+        if has_controls {
+            lines.push(("control goes on and is safe".to_owned(), Role::Text));
+        }
         lines.push((view.stage_words(), Role::Text));
         if let Some(angle) = snapshot.state.get(2) {
             lines.push((format!("pole {}°", signed(angle.to_degrees(), 6, 1)), Role::Text));
@@ -32,7 +35,8 @@ pub fn draw(pen: &mut Pen<'_>, view: Option<&View<'_>>) {
             let share = fixed(view.share() * 100.0, 3, 0);
             lines.push((format!("your share {share} %"), Role::You));
         }
-        lines.push(("space stop   q end".to_owned(), Role::Dim));
+        let keys = if has_controls { "space stop   q end" } else { "q quit" };
+        lines.push((keys.to_owned(), Role::Dim));
     }
     let shown = u16::try_from(lines.len()).unwrap_or(u16::MAX).min(height);
     let top = (height - shown) / 2;

@@ -1,7 +1,7 @@
 //! Labelled numbers at the right below the scene: how the task goes, the state, the learner
 //! and the clock.
 
-use super::View;
+use super::{Seat, View};
 use crate::report::achieved::yardstick;
 use crate::report::metrics::rollouts_of;
 use crate::signal::End;
@@ -99,7 +99,10 @@ fn learner_and_clock(pen: &mut Pen<'_>, view: &View<'_>) {
     let seen = view.panel;
     let fields = format!("{:>4}/{}", seen.fields, view.info.field_cap);
     left(pen, 3, "fields", &fields, Role::Text);
-    right(pen, 3, "learned", &count(seen.learned, 6));
+    // No row tells how many samples the learner took.
+    if !matches!(view.ui.seat, Seat::Replay(_)) {
+        right(pen, 3, "learned", &count(seen.learned, 6));
+    }
     let has_trouble = seen.lost_rows > 0 || seen.missed > 0;
     if !has_trouble && !view.info.device_state.is_empty() && view.phase().is_steered() {
         pen.text(0, 4, &cut(&view.info.device_state, 30), Role::Text);

@@ -11,6 +11,12 @@ const MEASURE: usize = 44;
 /// Draws the box that belongs to the stage, if one does.
 pub fn draw(pen: &mut Pen<'_>, view: &View<'_>) {
     let (title, role, lines): (_, _, &[&str]) = match view.panel.stage {
+        // Whoever only looks on has nothing to press.
+        Stage::Paused(_) if !view.ui.seat.has_controls() => ("PAUSED", Role::Strong, &[]),
+        Stage::Stopped(_) if !view.ui.seat.has_controls() => ("EMERGENCY STOP", Role::Alarm, &[]),
+        Stage::Finished(_) if !view.ui.seat.has_controls() => {
+            ("OVER", Role::Strong, &["This session is over."])
+        }
         Stage::Paused(moment) if moment.phase.is_steered() && moment.step > 0 => {
             ("PAUSED", Role::Strong, &["P or Enter   go on", "x            discard rollout"])
         }

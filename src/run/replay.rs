@@ -1,0 +1,196 @@
+//! `coadapt replay`: a recorded session on the screen, or done once more and compared.
+
+use std::io::{self, IsTerminal};
+use std::panic::{self, AssertUnwindSafe};
+use std::path::Path;
+use std::process::ExitCode;
+
+use serde::Serialize;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+use super::session::usage;
+use super::shutdown::Shutdown;
+use super::{RunError, panics, say, screen, signal_code, tell};
+use crate::cli;
+use crate::clock::WallClock;
+use crate::control::recording::Recording;
+use crate::operator::Choice;
+use crate::operator::terminal::{self, Hands};
+use crate::profile::{Document, Profile};
+use crate::record::{self, Sidecar, Status, folder};
+use crate::study::verify::{Difference, Verdict, VerifyError, verify};
+use crate::tui::app::End;
+use crate::tui::replay::{self, Player};
+use crate::tui::terminal::{Feed, KeysFrom, Screen, give_back, look};
+
+/// `coadapt replay …`
+pub(super) fn replay(words: &cli::Replay) -> Result<ExitCode, RunError> {
+    let (sidecar, profile) = session(&words.session)?;
+    if words.verify {
+        return checked(words, &sidecar, &profile);
+    }
+    if !io::stdout().is_terminal() {
+        return Err(RunError::Usage(format!(
+            "replay draws on a terminal, and standard output is none: run it in one, or compare \
+             the session with its repetition: coadapt replay {} --verify",
+            words.session.display()
+        )));
+    }
+    Screen::check(KeysFrom::Input).map_err(|error| usage(&error))?;
+    on_screen(&words.session, &sidecar, &profile)
+}
+
+/// The facts and the profile of the session in `folder`.
+fn session(folder: &Path) -> Result<(Sidecar, Profile), RunError> {
+    let file = folder.join("session.json");
+    if !file.exists() {
+        return Err(RunError::Usage(format!(
+            "{}: this folder is no recorded session, for session.json is missing; give a \
+             session's folder, such as logs/S07/001-balance-simultaneous",
+            folder.display()
+        )));
+    }
+    let sidecar = record::read_sidecar(&file).map_err(|error| usage(&error))?;
+    let profile = Document::from_text("session.json", sidecar.profile_ron.clone())
+        .read()
+        .map_err(|report| usage(&report))?;
+    Ok((sidecar, profile))
+}
+
+/// Shows the session until the person leaves.
+fn on_screen(folder: &Path, sidecar: &Sidecar, profile: &Profile) -> Result<ExitCode, RunError> {
+    let task = profile.experiment.task(profile.tick());
+    let recording =
+        Recording::read(folder, task, profile.session.returns).map_err(|error| usage(&error))?;
+    if recording.is_empty() {
+        let why = recording.trouble().unwrap_or("not one step was recorded");
+        return Err(RunError::Usage(format!("{}: nothing to replay: {why}", folder.display())));
+    }
+    let look = look(profile.screen.glyphs);
+    let player = Player::new(recording, screen::info_of(profile, sidecar), look);
+    let frames_per_s = profile.screen.frames_per_s;
+    shown(|screen, is_over| replay::show(screen, player, frames_per_s, is_over))
+}
+
+/// Takes the terminal, lets `show` draw there until it says how it ended, and gives it back.
+pub(super) fn shown(
+    show: impl FnOnce(&mut Screen, &dyn Fn() -> bool) -> End,
+) -> Result<ExitCode, RunError> {
+    let feed = Feed::new(Hands::new(&terminal::Params::default()), WallClock::start());
+    let shutdown = Shutdown::listen();
+    let mut screen = Screen::take(feed, KeysFrom::Input).map_err(|error| usage(&error))?;
+    let is_over = || shutdown.signal().is_some();
+    let ended = panic::catch_unwind(AssertUnwindSafe(|| show(&mut screen, &is_over)));
+    // A terminal that is gone lets even its farewell fail.
+    let _ = panic::catch_unwind(AssertUnwindSafe(|| drop(screen)));
+    give_back();
+    panics::tell_last_words();
+    Ok(match ended {
+        Ok(End::Quit) => ExitCode::SUCCESS,
+        Ok(End::Interrupted) => signal_code(SIGINT),
+        Ok(End::Signal) => signal_code(shutdown.signal().unwrap_or(SIGTERM)),
+        Ok(End::Lost) => signal_code(SIGHUP),
+        Err(_) => return Err(RunError::Failed("the screen failed".to_owned())),
+    })
+}
+
+/// The JSON object of `replay --verify`.
+#[derive(Serialize)]
+struct Object<'a> {
+    schema: u32,
+    session: String,
+    /// Whether every row is the same.
+    verified: bool,
+    rows: u64,
+    rollouts: u64,
+    /// Whether more may follow: the session was cut, or still runs.
+    partial: bool,
+    difference: Option<&'a Difference>,
+    /// What recorded it, where that is not this program.
+    recorded_by: Option<String>,
+    /// Why it cannot be done once more.
+    refused: Option<String>,
+}
+
+/// Does the session once more and says what came of it.
+fn checked(
+    words: &cli::Replay,
+    sidecar: &Sidecar,
+    profile: &Profile,
+) -> Result<ExitCode, RunError> {
+    let folder = &words.session;
+    let choice: Option<Choice> = sidecar.operator.parse().ok();
+    let agent = match choice {
+        Some(Choice::QLearning) => {
+            let agent = profile.experiment.agent(sidecar.seed).map_err(|error| usage(&error))?;
+            Some(Box::new(agent) as Box<dyn crate::operator::Operator>)
+        }
+        _ => None,
+    };
+    let is_foreign =
+        sidecar.version != record::VERSION || sidecar.host.architecture != std::env::consts::ARCH;
+    let recorded_by =
+        is_foreign.then(|| format!("coadapt {} on {}", sidecar.version, sidecar.host.architecture));
+    let (verdict, refused) = match verify(folder, profile, sidecar, agent) {
+        Ok(verdict) => (verdict, None),
+        Err(error @ VerifyError::RealPlant { .. }) if words.json => {
+            (Verdict { rows: 0, rollouts: 0, difference: None }, Some(error.to_string()))
+        }
+        Err(error) => return Err(usage(&error)),
+    };
+    let is_same = verdict.difference.is_none() && refused.is_none();
+    let partial = sidecar.status != Status::Complete;
+    if words.json {
+        let object = Object {
+            schema: 1,
+            session: folder.display().to_string(),
+            verified: is_same,
+            rows: verdict.rows,
+            rollouts: verdict.rollouts,
+            partial,
+            difference: verdict.difference.as_ref(),
+            recorded_by,
+            refused: refused.clone(),
+        };
+        let json = serde_json::to_string(&object)
+            .map_err(|error| RunError::Failed(format!("the verdict has no JSON: {error}")))?;
+        say(&json)?;
+    } else {
+        say(&sentences(folder, sidecar, &verdict).join("\n"))?;
+        if let Some(by) = recorded_by.filter(|_| !is_same) {
+            tell(&format!("it was recorded by {by}: another program may round otherwise"));
+        }
+    }
+    if refused.is_some() {
+        return Ok(ExitCode::from(2));
+    }
+    Ok(if is_same { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// The verdict for people.
+fn sentences(folder: &Path, sidecar: &Sidecar, verdict: &Verdict) -> Vec<String> {
+    let Verdict { rows, rollouts, difference } = verdict;
+    let same = format!("{rows} rows and {rollouts} rollouts");
+    let mut lines = match difference {
+        None => vec![
+            format!("{}: verified", folder.display()),
+            format!("{same} are the same, bit by bit, when the session is done once more"),
+        ],
+        Some(difference) => vec![
+            format!("{}: NOT the same when the session is done once more", folder.display()),
+            format!("first difference: {difference}"),
+            format!("{same} before it are the same, bit by bit"),
+        ],
+    };
+    let lost = sidecar.timing.as_ref().map_or(0, |timing| timing.lost_rows);
+    if difference.is_some() && lost > 0 {
+        lines.push(format!(
+            "the recording lost {lost} rows, without which what follows them cannot be repeated"
+        ));
+    }
+    if difference.is_none() && sidecar.status == Status::Running {
+        let still = if folder::is_busy(folder) { "still runs" } else { "was cut" };
+        lines.push(format!("the session {still}: this is as far as it goes"));
+    }
+    lines
+}
