@@ -1,5 +1,7 @@
 //! The words of the command line.
 
+mod export;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, value_parser};
@@ -8,6 +10,7 @@ use crate::profile::Order;
 use crate::session::BadSubject;
 use crate::session::plan::MOST_ROLLOUTS;
 use crate::study::batch::Shard;
+pub use export::Export;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -45,6 +48,8 @@ pub enum Command {
     Fit(Fit),
     /// Many sessions, compared: arms × operators × seeds × settings, on all cores.
     Study(Study),
+    /// A session's tables for pandas and R, or its course for Foxglove.
+    Export(Export),
     /// A plant open loop: a table of actions in, a table of states out.
     Simulate(Simulate),
     /// This computer's gamepad for a session at another: lines on standard output.

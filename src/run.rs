@@ -5,6 +5,7 @@ mod devices;
 #[cfg(unix)]
 mod emulate;
 mod evaluate;
+mod export;
 mod fit;
 #[cfg(unix)]
 mod guard;
@@ -82,6 +83,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Evaluate(words)) => evaluate::evaluate(words),
         Some(Command::Fit(words)) => fit::fit(words),
         Some(Command::Study(words)) => study::study(words),
+        Some(Command::Export(words)) => export::export(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::PadRelay(words)) => pad_relay::pad_relay(words),
         #[cfg(unix)]
