@@ -267,12 +267,15 @@ mod in_parquet {
     use arrow_array::cast::AsArray;
     use arrow_array::types::{Float64Type, UInt32Type};
     use arrow_array::{Array, RecordBatch};
+    use arrow_schema::SchemaRef;
     use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
-    fn batches(path: &Path) -> Vec<RecordBatch> {
+    /// The file's schema and rows.
+    fn read(path: &Path) -> (SchemaRef, Vec<RecordBatch>) {
         let file = fs::File::open(path).unwrap();
-        let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap().build().unwrap();
-        reader.map(Result::unwrap).collect()
+        let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+        let schema = reader.schema().clone();
+        (schema, reader.build().unwrap().map(Result::unwrap).collect())
     }
 
     /// A cell as the CSV export writes it.
@@ -297,8 +300,8 @@ mod in_parquet {
         for name in ["steps", "episodes", "events", "evaluation"] {
             let table = columns(&desk.at("csv").join(format!("{name}.csv")));
             let units = units(&desk.at("csv"), name);
-            let batches = batches(&desk.at("parquet").join(format!("{name}.parquet")));
-            let schema = batches[0].schema();
+            let path = desk.at("parquet").join(format!("{name}.parquet"));
+            let (schema, batches) = read(&path);
             assert_eq!(schema.fields().len(), table.len());
             assert_eq!(schema.metadata()["subject"], "S07");
             for (at, field) in schema.fields().iter().enumerate() {
@@ -329,7 +332,7 @@ mod in_parquet {
     #[test]
     fn what_is_missing_stays_so() {
         let desk = desk();
-        let batch = batches(&crafted(&desk, "parquet").join("steps.parquet")).remove(0);
+        let batch = read(&crafted(&desk, "parquet").join("steps.parquet")).1.remove(0);
         let column = |name: &str| batch.column_by_name(name).unwrap();
         assert_eq!(column("u_machine").null_count(), 5);
         assert_eq!(column("x").null_count(), 1);

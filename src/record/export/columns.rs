@@ -52,7 +52,7 @@ fn of_any_task(name: &str) -> Option<About> {
         "subject" => (Text, "", "who took part"),
         "trial" => (Whole, "1", "the subject's trial, from 1"),
         "task" => (Text, "", "the task"),
-        "preset" => (Text, "", "the profile"),
+        "preset" => (Text, "", "the preset, such as thesis or modern"),
         "mode" => (Text, "", "simultaneous: the robot takes over; sequential: it only watches"),
         "phase" => {
             (Text, "", "introduction, main, autonomous (robot alone), zero_control (nobody)")
