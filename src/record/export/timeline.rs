@@ -81,7 +81,7 @@ impl<'a> Timeline<'a> {
         let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
         let properties = self.properties(&names);
         let title = format!("coadapt{}", topic.replace('/', "."));
-        self.register(topic, &title, names, properties)
+        self.register(topic, &title, names, &properties)
     }
 
     fn properties(&self, names: &[String]) -> Map<String, Value> {
@@ -93,7 +93,7 @@ impl<'a> Timeline<'a> {
         topic: &'static str,
         title: &str,
         names: Vec<String>,
-        properties: Map<String, Value>,
+        properties: &Map<String, Value>,
     ) -> Result<u16, Error> {
         let schema = json!({ "type": "object", "title": title, "properties": properties });
         let schema = self.writer.add_schema(title, "jsonschema", schema.to_string().as_bytes());
@@ -144,7 +144,7 @@ impl<'a> Timeline<'a> {
         let names: Vec<String> = EVENT_COLUMNS.iter().map(|name| (*name).to_owned()).collect();
         let mut properties = self.properties(&names);
         properties.extend(log_properties());
-        let channel = self.register("/event", "foxglove.Log", names, properties)?;
+        let channel = self.register("/event", "foxglove.Log", names, &properties)?;
         let mut places = Places::of(&session.rollouts);
         let rows = read_events(&session.file(EVENTS))?;
         let messages = rows.into_iter().map(|row| {
