@@ -1,5 +1,6 @@
 //! The words of the command line.
 
+mod export;
 mod look;
 
 use std::path::PathBuf;
@@ -10,7 +11,7 @@ use crate::profile::Order;
 use crate::session::BadSubject;
 use crate::session::plan::MOST_ROLLOUTS;
 use crate::study::batch::Shard;
-
+pub use export::Export;
 pub use look::{Replay, Watch};
 
 const EXAMPLES: &str = "\
@@ -54,6 +55,8 @@ pub enum Command {
     Replay(Replay),
     /// A session at another terminal, read-only, as it runs.
     Watch(Watch),
+    /// A session's tables for pandas and R, or its course for Foxglove.
+    Export(Export),
     /// A plant open loop: a table of actions in, a table of states out.
     Simulate(Simulate),
     /// This computer's gamepad for a session at another: lines on standard output.

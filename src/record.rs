@@ -13,6 +13,7 @@ pub mod checkpoint;
 mod document;
 mod error;
 pub mod evaluation;
+pub mod export;
 mod finite;
 pub mod folder;
 mod layout;

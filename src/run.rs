@@ -5,6 +5,7 @@ mod devices;
 #[cfg(unix)]
 mod emulate;
 mod evaluate;
+mod export;
 mod fit;
 #[cfg(unix)]
 mod guard;
@@ -92,6 +93,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Watch(_)) => {
             Err(RunError::Usage("this system has no Unix sockets to watch through".to_owned()))
         }
+        Some(Command::Export(words)) => export::export(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::PadRelay(words)) => pad_relay::pad_relay(words),
         #[cfg(unix)]
