@@ -14,6 +14,8 @@ pub mod outcome;
 mod pad_relay;
 mod panics;
 mod plant;
+mod progress;
+mod report;
 mod screen;
 pub mod session;
 mod shutdown;
@@ -82,6 +84,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
         Some(Command::Evaluate(words)) => evaluate::evaluate(words),
         Some(Command::Fit(words)) => fit::fit(words),
         Some(Command::Study(words)) => study::study(words),
+        Some(Command::Report(words)) => report::report(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::PadRelay(words)) => pad_relay::pad_relay(words),
         #[cfg(unix)]

@@ -1,9 +1,8 @@
 //! A progress bar on standard error: finished runs, and the time that is left.
 
-use std::io::{self, IsTerminal};
+use indicatif::ProgressBar;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-
+use crate::run::progress;
 use crate::study::batch::Progress;
 
 /// Shows how far a study is, where somebody looks.
@@ -14,19 +13,7 @@ pub(super) struct Bar {
 impl Bar {
     /// A bar of `runs` runs.
     pub(super) fn new(runs: usize) -> Self {
-        let is_dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-        if !io::stderr().is_terminal() || is_dumb || runs == 0 {
-            return Self { drawn: None };
-        }
-        let target = ProgressDrawTarget::stderr_with_hz(5);
-        let bar = ProgressBar::with_draw_target(Some(runs as u64), target);
-        let template = "{pos}/{len} runs {wide_bar} {percent:>3} %  {eta:>4} left{msg}";
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style.progress_chars("=> "));
-        }
-        // Drawn at once: the first run may take minutes.
-        bar.tick();
-        Self { drawn: Some(bar) }
+        Self { drawn: progress::bar(runs, "runs") }
     }
 
     /// Shows `progress`.
