@@ -18,6 +18,7 @@ pub mod live;
 pub mod palette;
 pub mod pen;
 pub mod plant;
+pub mod report;
 pub mod results;
 pub mod scene;
 pub mod sensitivity;

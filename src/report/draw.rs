@@ -5,11 +5,12 @@
 //! colours of paper. Colours are those of Okabe and Ito (2008), which people with any colour
 //! vision tell apart, and each has a dash or a shape of its own beside it.
 
+mod legend;
+
 use std::borrow::Cow;
 use std::sync::Arc;
 
 use kuva::plot::colormap::ColorMap;
-use kuva::plot::legend::LegendPosition;
 use kuva::plot::line::{LinePlot, LineStyle};
 use kuva::plot::scatter::{MarkerShape, ScatterPlot};
 use kuva::plot::Heatmap;
@@ -95,6 +96,18 @@ fn colour(role: Role) -> String {
     format!("var({name})")
 }
 
+/// The dashes and the width of a line, in the picture and in its legend.
+const fn dashes(mark: Mark) -> (Option<&'static str>, f64) {
+    match mark {
+        Mark::Linked(at) if at % 2 == 1 => (Some("7 4"), 1.6),
+        Mark::Line | Mark::Shape(_) => (None, 1.8),
+        Mark::Linked(_) => (None, 1.6),
+        Mark::Dashed => (Some("7 4"), 1.8),
+        Mark::Dotted => (Some("2 3"), 2.0),
+        Mark::Thin => (None, 0.6),
+    }
+}
+
 const fn marker(shape: usize) -> MarkerShape {
     match shape % 6 {
         0 => MarkerShape::Circle,
@@ -141,19 +154,34 @@ fn drawn(figure: &Figure) -> String {
         .with_tick_size(TEXT)
         .with_body_size(TEXT)
         .with_legend_box(false);
-    if matches!(figure.content, Content::Series(_)) {
-        layout = layout.with_legend_position(LegendPosition::OutsideBottomColumns);
-    }
     if let Some((least, most)) = figure.x.range {
         layout = layout.with_x_axis_min(least).with_x_axis_max(most);
     }
     if let Some((least, most)) = figure.y.range {
         layout = layout.with_y_axis_min(least).with_y_axis_max(most);
     }
+    if let Some(ground) = figure.ground() {
+        layout = layout.with_y_axis_min(ground);
+    }
     if !figure.x.names.is_empty() {
         layout = layout.with_x_tick_step(1.0).with_x_tick_format(names(&figure.x));
     }
-    kuva::render_to_svg(plots, layout)
+    let svg = kuva::render_to_svg(plots, layout);
+    match &figure.content {
+        Content::Series(series) => with_legend(&svg, series),
+        Content::Cells(_) => svg,
+    }
+}
+
+/// The picture with a legend below it.
+fn with_legend(svg: &str, series: &[Series]) -> String {
+    let (legend, more) = legend::legend(series, HEIGHT);
+    let taller = svg.replacen(
+        &format!("height=\"{HEIGHT}\""),
+        &format!("height=\"{}\"", HEIGHT + more),
+        1,
+    );
+    taller.replacen("</svg>", &format!("{legend}</svg>"), 1)
 }
 
 /// Words at the places of the axis that have one.
@@ -167,19 +195,13 @@ fn names(axis: &Axis) -> TickFormat {
 
 /// A series as what kuva draws: a line for each unbroken part, and shapes.
 fn plots(series: &Series) -> Vec<Plot> {
-    let (style, width) = match series.mark {
-        Mark::Line | Mark::Shape(_) => (LineStyle::Solid, 1.8),
-        Mark::Linked(at) => ([LineStyle::Solid, LineStyle::Dashed][at % 2].clone(), 1.6),
-        Mark::Dashed => (LineStyle::Custom("7 4".to_owned()), 1.8),
-        Mark::Dotted => (LineStyle::Custom("2 3".to_owned()), 2.0),
-        Mark::Thin => (LineStyle::Solid, 0.6),
-    };
+    let (dashes, width) = dashes(series.mark);
+    let style = dashes.map_or(LineStyle::Solid, |dashes| LineStyle::Custom(dashes.to_owned()));
     let shape = match series.mark {
         Mark::Shape(shape) | Mark::Linked(shape) => Some(shape),
         _ => None,
     };
     let mut plots = Vec::new();
-    let mut label = Some(series.label.as_str());
     if !matches!(series.mark, Mark::Shape(_)) {
         for piece in series.pieces() {
             let mut line = LinePlot::new()
@@ -193,9 +215,6 @@ fn plots(series: &Series) -> Vec<Plot> {
             {
                 line = line
                     .with_band(spread.iter().map(|pair| pair.0), spread.iter().map(|pair| pair.1));
-            }
-            if let (None, Some(label)) = (shape, label.take()) {
-                line = line.with_legend(label);
             }
             plots.push(Plot::Line(line));
         }
@@ -211,9 +230,8 @@ fn shapes(series: &Series, shape: usize) -> ScatterPlot {
     let mut scatter = ScatterPlot::new()
         .with_data(points.iter().copied())
         .with_color(colour(series.role))
-        .with_size(3.0)
-        .with_marker(marker(shape))
-        .with_legend(series.label.as_str());
+        .with_size(if points.len() <= 2 { 5.0 } else { 3.0 })
+        .with_marker(marker(shape));
     if let Some(spread) = &series.spread
         && spread.len() == points.len()
         && points.len() <= MOST_BARS

@@ -178,6 +178,24 @@ pub struct Figure {
     pub content: Content,
 }
 
+impl Figure {
+    /// The least that is shown upwards, where 0 is near enough to be shown as well.
+    #[must_use]
+    pub fn ground(&self) -> Option<f64> {
+        let Content::Series(series) = &self.content else { return None };
+        let values = || {
+            let spreads = series.iter().filter_map(|one| one.spread.as_ref()).flatten();
+            let points = series.iter().flat_map(Series::pieces).flatten().map(|point| point.1);
+            points.chain(spreads.map(|pair| pair.0)).filter(|value| value.is_finite())
+        };
+        let (least, most) = (
+            values().fold(f64::INFINITY, f64::min),
+            values().fold(f64::NEG_INFINITY, f64::max),
+        );
+        (self.y.range.is_none() && least >= 0.0 && least < 0.7 * most).then_some(0.0)
+    }
+}
+
 /// A table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Table {

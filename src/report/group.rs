@@ -13,7 +13,7 @@ use super::figure::{Axis, Caption, Content, Figure, Item, Mark, Role, Section, S
 use super::gather::Recorded;
 use super::metrics::{deviation, mean};
 use super::series::{WINDOW, moving_average, over_rows};
-use super::session::{line, measure, measured, role, with_unit};
+use super::session::{line, measure, measured, numbered, role, with_unit};
 use super::words;
 use crate::record::EpisodeRow;
 use crate::session::Phase;
@@ -91,18 +91,22 @@ pub fn section(group: &Group<'_>) -> Section {
         items.extend(tables::swing_up(group).map(Item::Table));
     }
     items.extend(tables::subjects(group).map(Item::Table));
-    let figures = [
-        group.balance_time(),
-        group.moving_averages(),
-        group.at_ends(Mode::Simultaneous, "success", 33, |row| row.success),
-        group.at_ends(Mode::Sequential, "success", 33, |row| row.success),
-        group.at_ends(Mode::Simultaneous, "share", 34, |row| row.share),
-        group.autonomous(),
-        group.sorted(),
-        group.each_tenth(),
-        group.improvement(),
-    ];
-    items.extend(figures.into_iter().flatten().map(Item::Figure));
+    // Of one subject in one mode its own figures tell all but these.
+    let is_alone = matches!(&group.arms()[..], [(_, arm)] if arm.len() == 1);
+    let of_many = || {
+        [
+            group.balance_time(),
+            group.moving_averages(),
+            group.at_ends(Mode::Simultaneous, "success", 33, |row| row.success),
+            group.at_ends(Mode::Sequential, "success", 33, |row| row.success),
+            group.at_ends(Mode::Simultaneous, "share", 34, |row| row.share),
+            group.autonomous(),
+            group.sorted(),
+        ]
+    };
+    let figures = (!is_alone).then(of_many).into_iter().flatten();
+    let figures = figures.chain([group.each_tenth(), group.improvement()]).flatten();
+    items.extend(figures.map(Item::Figure));
     let mut notes = group.notes();
     notes.extend(comparison.sentences);
     Section { title: format!("Group: {}", group.preset), notes, items }
@@ -355,7 +359,10 @@ impl<'a> Group<'a> {
         }
         (longest > 0).then(|| Figure {
             caption,
-            x: Axis::new("subject, from worst to best", ""),
+            x: Axis {
+                names: (1..=longest).map(|n| (real(n), n.to_string())).collect(),
+                ..Axis::new("subject, from worst to best", "")
+            },
             y: Axis { range: None, ..axis },
             content: Content::Series(series),
         })
@@ -453,5 +460,3 @@ impl<'a> Group<'a> {
         })
     }
 }
-
-use super::session::numbered;

@@ -19,12 +19,21 @@ pub enum Screen {
     Devices,
     /// The real plant of a session.
     Plant,
+    /// Figures and tables of sessions.
+    Report,
 }
 
 impl Screen {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Setup, Self::Briefing, Self::Live, Self::Results, Self::Devices, Self::Plant];
+    pub const ALL: [Self; 7] = [
+        Self::Setup,
+        Self::Briefing,
+        Self::Live,
+        Self::Results,
+        Self::Devices,
+        Self::Plant,
+        Self::Report,
+    ];
 
     /// The heading in the help.
     #[must_use]
@@ -36,6 +45,7 @@ impl Screen {
             Self::Results => "results",
             Self::Devices => "devices",
             Self::Plant => "plant",
+            Self::Report => "report",
         }
     }
 }
@@ -47,6 +57,10 @@ pub enum Action {
     Next,
     /// To the one before.
     Previous,
+    /// To the next part of a report,
+    NextPart,
+    /// or to the one before.
+    PreviousPart,
     /// The value to the left; less.
     Left,
     /// The value to the right; more.
@@ -158,7 +172,7 @@ const fn elsewhere(
 pub const BINDINGS: &[Binding] = {
     use Action as A;
     use KeyCode::{BackTab, Char, Down, Enter, Esc, F, Left, Right, Tab, Up};
-    use Screen::{Briefing, Devices, Live, Plant, Results, Setup};
+    use Screen::{Briefing, Devices, Live, Plant, Report, Results, Setup};
     &[
         bind(Setup, &[Tab, Down], "Tab ↓", "next", "to the next field", A::Next),
         bind(Setup, &[BackTab, Up], "Shift-Tab ↑", "", "to the field before", A::Previous),
@@ -233,6 +247,16 @@ pub const BINDINGS: &[Binding] = {
         bind(Plant, &[Char('o'), Esc], "o", "scene", "back to the scene; also Esc", A::Plant),
         bind(Plant, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
         bind(Plant, &[Char('q')], "q", "end", "end the session (asks once)", A::Quit),
+        //
+        bind(Report, &[Right, Tab, Char('l')], "←→", "turn", "the next page; ← the one before", A::Next),
+        bind(Report, &[Left, BackTab, Char('h')], "", "", "the page before", A::Previous),
+        bind(Report, &[Down, Char('j')], "↓↑", "scroll", "more of a long page; ↑ back", A::Down),
+        bind(Report, &[Up, Char('k')], "", "", "back up", A::Up),
+        bind(Report, &[Char('n')], "n", "next part", "the next group, study or session", A::NextPart),
+        bind(Report, &[Char('p')], "p", "", "the one before", A::PreviousPart),
+        bind(Report, &[Char('s')], "s", "save", "save this figure here, as SVG and CSV", A::Save),
+        bind(Report, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
+        bind(Report, &[Char('q'), Esc], "q", "quit", "quit", A::Quit),
     ]
 };
 
@@ -261,6 +285,8 @@ pub fn action(screen: Screen, event: KeyEvent) -> Option<Action> {
         found,
         Action::Next
             | Action::Previous
+            | Action::NextPart
+            | Action::PreviousPart
             | Action::Left
             | Action::Right
             | Action::Up

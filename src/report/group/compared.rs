@@ -11,6 +11,7 @@ use crate::report::series::WINDOW;
 use crate::report::session::with_unit;
 use crate::report::spread::median;
 use crate::report::statistics::{Comparison, Test, compare, compare_paired};
+use crate::report::words;
 use crate::session::Phase;
 use crate::sharing::Mode;
 
@@ -117,7 +118,10 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
             _ => compare_paired(&a, &b, SEED),
         };
         if let Some(compared) = &compared {
-            sentences.push(format!("{name}, simultaneous against sequential: {compared}"));
+            sentences.push(format!(
+                "{}, simultaneous against sequential: {compared}.",
+                words::heading(&name)
+            ));
         }
         if !a.is_empty() || !b.is_empty() {
             rows.push(row(group.task, name, [&a, &b], compared.as_ref()));
