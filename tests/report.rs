@@ -97,7 +97,8 @@ fn a_page_and_its_files_are_written_whole() {
     for name in &named {
         assert!(desk.at("data").join(name).is_file(), "{name}");
     }
-    let csv = fs::read_to_string(desk.at("data/S1-001-balance-simultaneous-per-rollout.csv")).unwrap();
+    let csv =
+        fs::read_to_string(desk.at("data/S1-001-balance-simultaneous-per-rollout.csv")).unwrap();
     assert!(csv.starts_with("series,rollout,balance_time_s,least,most\nsimultaneous,1,"), "{csv}");
     assert_eq!(csv.lines().filter(|line| line.starts_with("simultaneous,")).count(), 14);
     let svg = fs::read_to_string(desk.at("data/S1-001-balance-simultaneous-share.svg")).unwrap();
@@ -141,7 +142,8 @@ fn what_cannot_be_used_is_named_and_the_rest_reported() {
         let folder = desk.at(&format!("logs/{name}/001-balance-simultaneous"));
         copy(&good, &folder);
         let sidecar = folder.join("session.json");
-        let renamed = fs::read_to_string(&sidecar).unwrap().replace("\"S1\"", &format!("\"{name}\""));
+        let renamed =
+            fs::read_to_string(&sidecar).unwrap().replace("\"S1\"", &format!("\"{name}\""));
         fs::write(&sidecar, renamed).unwrap();
         change(&folder);
     };
@@ -169,7 +171,9 @@ fn what_cannot_be_used_is_named_and_the_rest_reported() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|left| format!("{}: {}", left["path"].as_str().unwrap(), left["why"].as_str().unwrap()))
+        .map(|left| {
+            format!("{}: {}", left["path"].as_str().unwrap(), left["why"].as_str().unwrap())
+        })
         .collect();
     for (place, why) in [
         ("NEWER", "update coadapt"),

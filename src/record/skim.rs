@@ -83,18 +83,11 @@ impl Skim {
         let columns = head.len();
         // A file that was cut in its header has no rows either.
         let is_empty = head.is_empty();
-        if !is_empty && !(is_named(0, &before) && is_named(before.len() + state, &after)) {
+        if !(is_empty || is_named(0, &before) && is_named(before.len() + state, &after)) {
             return Err(Error::unfit(path, "its columns are not those of a session's steps"));
         }
         let record = ByteRecord::new();
-        Ok(Self {
-            path: path.to_owned(),
-            table,
-            record,
-            state,
-            columns,
-            spoilt: Spoilt::default(),
-        })
+        Ok(Self { path: path.to_owned(), table, record, state, columns, spoilt: Spoilt::default() })
     }
 
     /// The next row that can be used.
@@ -228,7 +221,8 @@ mod tests {
         let row = skim.next_row().unwrap().unwrap();
         assert_eq!((row.phase(), row.episode(), row.step()), (Some(Phase::Main), 3, 7));
         assert_eq!((row.t(), row.state(0), row.state(1)), (0.14, -0.5, 0.01));
-        let numbers = [Number::Human, Number::Machine, Number::Share, Number::Mixed, Number::Success];
+        let numbers =
+            [Number::Human, Number::Machine, Number::Share, Number::Mixed, Number::Success];
         let read = numbers.map(|number| row.number(number));
         assert_eq!(read, [Some(1.5), None, Some(0.75), Some(1.125), Some(0.2)]);
         assert_eq!(row.region(), "all");

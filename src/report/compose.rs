@@ -99,12 +99,16 @@ fn groups(sessions: &[Recorded]) -> Vec<Group<'_>> {
                 }
             }
             if at > 0 {
-                label = format!("{label} · {}", usual.map_or(String::new(), |usual| changes(usual, profile)));
+                label = format!(
+                    "{label} · {}",
+                    usual.map_or(String::new(), |usual| changes(usual, profile))
+                );
                 stem = format!("{stem}-variant-{}", at + 1);
             }
             let (sessions, cut) =
                 members.iter().partition(|session| session.status == Status::Complete);
-            let stem = stem.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "-");
+            let stem =
+                stem.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "-");
             groups.push(Group { task, preset: label, stem, sessions, cut });
         }
     }
@@ -131,7 +135,10 @@ mod tests {
     #[test]
     fn a_variant_says_in_what_it_differs() {
         let profile = |pairs: &[(&str, &str)]| {
-            pairs.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect::<BTreeMap<_, _>>()
+            pairs
+                .iter()
+                .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
+                .collect::<BTreeMap<_, _>>()
         };
         let usual = profile(&[("a", "1"), ("b", "2"), ("c", "3"), ("d", "4")]);
         let one = profile(&[("a", "1"), ("b", "5"), ("c", "3"), ("d", "4")]);

@@ -10,10 +10,10 @@ mod legend;
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use kuva::plot::Heatmap;
 use kuva::plot::colormap::ColorMap;
 use kuva::plot::line::{LinePlot, LineStyle};
 use kuva::plot::scatter::{MarkerShape, ScatterPlot};
-use kuva::plot::Heatmap;
 use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 use kuva::render::theme::Theme;
@@ -54,7 +54,8 @@ const INKS: [Ink; 12] = [
 #[must_use]
 pub fn style() -> String {
     let set = |of: fn(&Ink) -> &'static str| {
-        INKS.iter().map(|ink| format!("{}:{};", ink.0, of(ink))).collect::<String>()
+        let inks = INKS.iter().map(|ink| format!("{}:{};", ink.0, of(ink)));
+        inks.collect::<Vec<_>>().concat()
     };
     let (light, dark) = (set(|ink| ink.1), set(|ink| ink.2));
     format!(
@@ -176,11 +177,8 @@ fn drawn(figure: &Figure) -> String {
 /// The picture with a legend below it.
 fn with_legend(svg: &str, series: &[Series]) -> String {
     let (legend, more) = legend::legend(series, HEIGHT);
-    let taller = svg.replacen(
-        &format!("height=\"{HEIGHT}\""),
-        &format!("height=\"{}\"", HEIGHT + more),
-        1,
-    );
+    let taller =
+        svg.replacen(&format!("height=\"{HEIGHT}\""), &format!("height=\"{}\"", HEIGHT + more), 1);
     taller.replacen("</svg>", &format!("{legend}</svg>"), 1)
 }
 
@@ -246,7 +244,8 @@ fn shapes(series: &Series, shape: usize) -> ScatterPlot {
 
 fn heatmap(figure: &Figure, cells: &Cells) -> Heatmap {
     let known = || cells.rows.iter().flatten().copied().filter(|value| value.is_finite());
-    let (least, most) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
+    let (least, most) =
+        (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
     let middle = if cells.diverging { 0.0 } else { least };
     let rows = cells.rows.iter().map(|row| {
         row.iter().map(|value| if value.is_finite() { *value } else { middle }).collect::<Vec<_>>()
@@ -260,9 +259,7 @@ fn heatmap(figure: &Figure, cells: &Cells) -> Heatmap {
     }
     heatmap.with_color_map(if cells.diverging {
         let largest = least.abs().max(most.abs()).max(f64::MIN_POSITIVE);
-        ColorMap::Custom(Arc::new(move |part| {
-            diverging((least + part * (most - least)) / largest)
-        }))
+        ColorMap::Custom(Arc::new(move |part| diverging((least + part * (most - least)) / largest)))
     } else {
         ColorMap::Cividis
     })
@@ -359,7 +356,9 @@ mod tests {
         assert!(!page.contains("NaN"));
         let alone = alone(&figure());
         assert!(!alone.contains("var(") && alone.contains("#009e73"), "{alone}");
-        assert!(style().contains("--ink-2:#009e73") && style().contains("prefers-color-scheme:dark"));
+        assert!(
+            style().contains("--ink-2:#009e73") && style().contains("prefers-color-scheme:dark")
+        );
     }
 
     #[test]

@@ -56,12 +56,7 @@ pub struct Series {
 impl Series {
     /// A series without spread.
     #[must_use]
-    pub fn new(
-        label: impl Into<String>,
-        role: Role,
-        mark: Mark,
-        points: Vec<(f64, f64)>,
-    ) -> Self {
+    pub fn new(label: impl Into<String>, role: Role, mark: Mark, points: Vec<(f64, f64)>) -> Self {
         Self { label: label.into(), role, mark, points, spread: None }
     }
 
@@ -188,10 +183,8 @@ impl Figure {
             let points = series.iter().flat_map(Series::pieces).flatten().map(|point| point.1);
             points.chain(spreads.map(|pair| pair.0)).filter(|value| value.is_finite())
         };
-        let (least, most) = (
-            values().fold(f64::INFINITY, f64::min),
-            values().fold(f64::NEG_INFINITY, f64::max),
-        );
+        let (least, most) =
+            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
         (self.y.range.is_none() && least >= 0.0 && least < 0.7 * most).then_some(0.0)
     }
 }
@@ -381,8 +374,9 @@ mod tests {
 
     #[test]
     fn the_data_file_has_units_and_blanks_for_what_is_no_number() {
-        let series = Series::new("main", Role::Plain, Mark::Line, vec![(1.0, 0.5), (2.0, f64::NAN)])
-            .within(vec![(0.25, 0.75)]);
+        let series =
+            Series::new("main", Role::Plain, Mark::Line, vec![(1.0, 0.5), (2.0, f64::NAN)])
+                .within(vec![(0.25, 0.75)]);
         let item = figure(Content::Series(vec![series]));
         assert_eq!(
             item.csv(),
@@ -409,7 +403,8 @@ mod tests {
     #[test]
     fn no_two_items_write_one_file() {
         let item = figure(Content::Series(vec![]));
-        let section = Section { items: vec![item.clone(), item.clone(), item], ..Section::default() };
+        let section =
+            Section { items: vec![item.clone(), item.clone(), item], ..Section::default() };
         let mut report = Report { sections: vec![section], ..Report::default() };
         report.tell_names_apart();
         let names: Vec<&str> = report.items().map(|item| &*item.caption().name).collect();

@@ -15,9 +15,11 @@ use super::figure::LeftOut;
 use crate::record::Status;
 
 pub use field::Field;
-pub use outcome::{CellDifference, Checkpoint, CurvePoint, Difference, Driven, Outcome, Sides, Value};
+pub use outcome::{
+    CellDifference, Checkpoint, CurvePoint, Difference, Driven, Outcome, Sides, Value,
+};
 pub use recorded::{Recorded, read};
-pub use trace::{Acted, Portrait, RegionTrack, Trace};
+pub use trace::{Acted, Moment, Portrait, RegionTrack, Trace};
 
 /// How deep folders are looked through: logs, subject, session, and some for archives.
 const DEPTH: u32 = 8;

@@ -36,6 +36,9 @@ pub struct Group<'a> {
     pub cut: Vec<&'a Recorded>,
 }
 
+/// A subject, and its means by percent of main.
+type Tenths<'a> = (&'a str, BTreeMap<u8, f64>);
+
 /// A subject in one mode.
 #[derive(Clone, Debug)]
 struct Subject<'a> {
@@ -132,7 +135,9 @@ impl<'a> Group<'a> {
         let arms: Vec<String> = self
             .arms()
             .iter()
-            .map(|(mode, arm)| format!("{} in {} mode", words::counted(arm.len(), "subject"), mode.word()))
+            .map(|(mode, arm)| {
+                format!("{} in {} mode", words::counted(arm.len(), "subject"), mode.word())
+            })
             .collect();
         let repeated = self.arms().iter().any(|(_, arm)| arm.iter().any(|s| s.sessions.len() > 1));
         let mut notes = vec![format!(
@@ -369,12 +374,13 @@ impl<'a> Group<'a> {
     }
 
     /// Each subject's means after each tenth, by mode.
-    fn after_tenths(&self) -> Vec<(Mode, Vec<(&'a str, BTreeMap<u8, f64>)>)> {
+    fn after_tenths(&self) -> Vec<(Mode, Vec<Tenths<'a>>)> {
         let arms = self.arms().into_iter().map(|(mode, arm)| {
             let known = arm.iter().map(|subject| {
                 let each: Vec<BTreeMap<u8, f64>> =
                     subject.sessions.iter().map(|session| tenths(session)).collect();
-                let percents: BTreeSet<u8> = each.iter().flat_map(BTreeMap::keys).copied().collect();
+                let percents: BTreeSet<u8> =
+                    each.iter().flat_map(BTreeMap::keys).copied().collect();
                 let at = |percent: u8| {
                     let values: Vec<f64> =
                         each.iter().filter_map(|one| one.get(&percent)).copied().collect();
@@ -406,7 +412,7 @@ impl<'a> Group<'a> {
         let title = format!("{} of the robot alone after each tenth", words::heading(&axis.label));
         (!series.is_empty()).then(|| Figure {
             caption: self.caption("tenths", 37, &title, sentence),
-            x: Axis::new("part of main", "%").from(0.0, 100.0),
+            x: Axis::new("part of main", "%").from(0.0, 103.0),
             y: Axis { range: None, ..axis },
             content: Content::Series(series),
         })
@@ -419,7 +425,8 @@ impl<'a> Group<'a> {
         let sign = if yardstick(self.task).more_is_better { 1.0 } else { -1.0 };
         let (mut series, mut told) = (Vec::new(), Vec::new());
         for (mode, subjects) in self.after_tenths() {
-            let percents: BTreeSet<u8> = subjects.iter().flat_map(|(_, t)| t.keys()).copied().collect();
+            let percents: BTreeSet<u8> =
+                subjects.iter().flat_map(|(_, t)| t.keys()).copied().collect();
             let means: Vec<(f64, f64)> = percents
                 .into_iter()
                 .map(|percent| {
@@ -454,7 +461,7 @@ impl<'a> Group<'a> {
         };
         (!series.is_empty()).then(|| Figure {
             caption: self.caption("improvement", 38, title, sentence),
-            x: Axis::new("part of main", "%").from(0.0, 100.0),
+            x: Axis::new("part of main", "%").from(0.0, 103.0),
             y,
             content: Content::Series(series),
         })

@@ -69,9 +69,9 @@ fn write_section(page: &mut String, section: &Section, at: usize, folds: bool) -
     // A group, a study or both modes of a subject is what one came for.
     let is_open = !folds || ["Group", "Study"].iter().any(|word| section.title.starts_with(word));
     let open = if is_open { " open" } else { "" };
-    write!(page, "<details id=\"part-{at}\"{open}><summary><h2>{title}</h2></summary>\n")?;
+    writeln!(page, "<details id=\"part-{at}\"{open}><summary><h2>{title}</h2></summary>")?;
     for note in &section.notes {
-        write!(page, "<p class=\"note\">{}</p>\n", escaped(note))?;
+        writeln!(page, "<p class=\"note\">{}</p>", escaped(note))?;
     }
     page.push_str("<div class=\"items\">\n");
     for item in &section.items {
@@ -105,10 +105,10 @@ fn write_figure(page: &mut String, item: &Item, figure: &Figure) -> std::fmt::Re
     write!(page, "<figure id=\"{name}\">")?;
     write_caption(page, item)?;
     page.push_str(&draw::for_page(figure));
-    write!(
+    writeln!(
         page,
         "<figcaption>{} <span class=\"data\">Data: <code>{}</code> \
-         <button data-save=\"{name}\">save SVG</button></span></figcaption></figure>\n",
+         <button data-save=\"{name}\">save SVG</button></span></figcaption></figure>",
         escaped(&figure.caption.sentence),
         escaped(&item.data_file()),
     )
@@ -134,10 +134,10 @@ fn write_table(page: &mut String, item: &Item, table: &Table) -> std::fmt::Resul
         }
         page.push_str("</tr>");
     }
-    write!(
+    writeln!(
         page,
         "</tbody></table></div><figcaption>{} <span class=\"data\">Data: <code>{}</code></span>\
-         </figcaption></figure>\n",
+         </figcaption></figure>",
         escaped(&table.caption.sentence),
         escaped(&item.data_file())
     )

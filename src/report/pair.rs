@@ -21,7 +21,8 @@ pub fn section(views: [View<'_>; 2]) -> Section {
         around_starts(views, Phase::Main),
         around_starts(views, Phase::Autonomous),
     ];
-    let trials = views.map(|view| format!("{:03} {}", view.session.trial, view.session.mode.word()));
+    let trials =
+        views.map(|view| format!("{:03} {}", view.session.trial, view.session.mode.word()));
     Section {
         title: format!("{} · {} · both modes", session.subject, session.task),
         notes: vec![format!("Trials {} of one subject, under one preset.", trials.join(" and "))],
@@ -123,8 +124,7 @@ fn around_starts(views: [View<'_>; 2], phase: Phase) -> Option<Figure> {
         with_unit(task, means[0]),
         with_unit(task, means[1])
     );
-    let title =
-        format!("{} {who} by {}, both modes", words::heading(&axis.label), start.label);
+    let title = format!("{} {who} by {}, both modes", words::heading(&axis.label), start.label);
     Some(Figure {
         caption: caption(views[0], name, number, title, sentence),
         x: Axis::new(start.label, start.unit),

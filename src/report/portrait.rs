@@ -43,12 +43,7 @@ fn of_phase(view: View<'_>, phase: Phase) -> Option<Figure> {
         _ => (28, "zero-control", "with nobody at the controls", "zero control", Role::Plain),
     };
     let like = if session.task == Balance::NAME { "" } else { "like " };
-    let sentence = format!(
-        "The {} against the {} {who}: {}.",
-        y.label,
-        x.label,
-        shown(portrait)
-    );
+    let sentence = format!("The {} against the {} {who}: {}.", y.label, x.label, shown(portrait));
     Some(Figure {
         caption: view.caption(
             &format!("portrait-{name}"),

@@ -41,7 +41,8 @@ pub fn by_x(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 #[must_use]
 pub fn extent(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let xs = || points.iter().map(|point| point.0).filter(|x| x.is_finite());
-    let (least, most) = (xs().fold(f64::INFINITY, f64::min), xs().fold(f64::NEG_INFINITY, f64::max));
+    let (least, most) =
+        (xs().fold(f64::INFINITY, f64::min), xs().fold(f64::NEG_INFINITY, f64::max));
     (least <= most).then_some((least, most))
 }
 

@@ -2,7 +2,7 @@
 
 use super::achieved::{Yardstick, yardstick};
 use super::figure::{Axis, Caption, Content, Figure, Item, Mark, Role, Section, Series, real};
-use super::gather::Recorded;
+use super::gather::{Moment, Recorded};
 use super::metrics::mean;
 use super::series::{NEIGHBOURS, WINDOW, average_around, by_x, extent, moving_average};
 use super::{portrait, words};
@@ -31,14 +31,18 @@ pub fn section(view: View<'_>) -> Section {
     add(view.per_rollout());
     add(view.moving_average());
     if goes_by_time(&session.task) {
-        view.by_time().into_iter().for_each(|figure| add(Some(figure)));
+        for figure in view.by_time() {
+            add(Some(figure));
+        }
     } else {
         add(view.success());
         add(view.share());
     }
     add(view.by_start(Phase::Main));
     add(view.by_start(Phase::Autonomous));
-    portrait::figures(view).into_iter().for_each(|figure| add(Some(figure)));
+    for figure in portrait::figures(view) {
+        add(Some(figure));
+    }
     let title = format!("{} · {} · {}", session.title(), session.task, session.mode.word());
     Section { title, notes: view.notes(), items }
 }
@@ -92,7 +96,8 @@ pub fn measured(task: &str, rows: &[&EpisodeRow]) -> Vec<f64> {
 #[must_use]
 pub fn by_start(task: &str, rows: &[&EpisodeRow]) -> Vec<(f64, f64)> {
     let factor = words::start(task).factor;
-    let known = rows.iter().filter_map(|row| Some((row.start * factor, (yardstick(task).of)(row)?)));
+    let known =
+        rows.iter().filter_map(|row| Some((row.start * factor, (yardstick(task).of)(row)?)));
     by_x(&known.collect::<Vec<_>>())
 }
 
@@ -209,7 +214,12 @@ impl View<'_> {
             ),
             x: Axis::new("rollout", ""),
             y: axis,
-            content: Content::Series(vec![Series::new(mode.word(), role(*mode), line(*mode), points)]),
+            content: Content::Series(vec![Series::new(
+                mode.word(),
+                role(*mode),
+                line(*mode),
+                points,
+            )]),
         })
     }
 
@@ -233,7 +243,12 @@ impl View<'_> {
             ),
             x: Axis::new("rollout", ""),
             y: Axis::new("success", "%").from(0.0, 100.0),
-            content: Content::Series(vec![Series::new(mode.word(), role(mode), line(mode), points)]),
+            content: Content::Series(vec![Series::new(
+                mode.word(),
+                role(mode),
+                line(mode),
+                points,
+            )]),
         })
     }
 
@@ -257,7 +272,12 @@ impl View<'_> {
             ),
             x: Axis::new("rollout", ""),
             y: Axis::new("person's share w", "%").from(0.0, 100.0),
-            content: Content::Series(vec![Series::new(mode.word(), role(mode), line(mode), points)]),
+            content: Content::Series(vec![Series::new(
+                mode.word(),
+                role(mode),
+                line(mode),
+                points,
+            )]),
         })
     }
 
@@ -265,10 +285,10 @@ impl View<'_> {
     fn by_time(&self) -> Vec<Figure> {
         let tracks = &self.session.trace.regions;
         let is_swing_up = self.session.task == SwingUp::NAME;
-        let curve = |what: &str, of: &dyn Fn(&(f64, Option<f64>, f64)) -> Option<f64>| {
+        let curve = |what: &str, of: fn(&Moment) -> Option<f64>| {
             let series = tracks.iter().enumerate().map(|(at, track)| {
                 let known = track.moments.iter();
-                let points = known.filter_map(|m| Some((m.0, 100.0 * of(m)?))).collect();
+                let points = known.filter_map(|m| Some((m.t, 100.0 * of(m)?))).collect();
                 let name = if track.name == "all" { what } else { &track.name };
                 let mark = match at % 3 {
                     0 => Mark::Line,
@@ -279,8 +299,8 @@ impl View<'_> {
             });
             series.filter(|series| !series.points.is_empty()).collect::<Vec<_>>()
         };
-        let success = curve("success", &|moment| moment.1);
-        let share = curve("person's share w", &|moment| Some(moment.2));
+        let success = curve("success", |moment| moment.success);
+        let share = curve("person's share w", |moment| Some(moment.share));
         let figure = |name: &str, thesis: &str, title: &str, sentence: &str, y, series| Figure {
             caption: self.caption(name, thesis, title, sentence.to_owned()),
             x: Axis::new("controlled time of main", "s"),
@@ -351,7 +371,8 @@ impl View<'_> {
         if !zero.is_empty() {
             series.push(Series::new("zero control", Role::Plain, Mark::Dotted, zero.clone()));
         }
-        let nobody = if zero.is_empty() { "" } else { ", and what nobody at the controls comes to" };
+        let nobody =
+            if zero.is_empty() { "" } else { ", and what nobody at the controls comes to" };
         let (name, thesis, title) = if phase == Phase::Main {
             ("by-start", self.of_balance(18, 19), "while teaching")
         } else {

@@ -12,6 +12,9 @@ use super::metrics::{deviation, mean};
 use super::words;
 use crate::task::mountain_car::MountainCar;
 
+/// Pairs that are drawn; all are in the study's own tables.
+const MOST_PAIRS: usize = 3;
+
 /// One setting and operator of a study.
 struct Part<'a> {
     outcome: &'a Outcome,
@@ -43,7 +46,8 @@ pub fn sections(outcome: &Outcome) -> Vec<Section> {
                 title = format!("{title} · {setting}");
                 preset = format!("{preset} · setting {setting}");
             }
-            let stem = stem.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "-");
+            let stem =
+                stem.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "-");
             let mut sides: Vec<&Sides> = Vec::new();
             for difference in &outcome.generalisation {
                 let one = &difference.sides;
@@ -125,10 +129,10 @@ impl<'a> Part<'a> {
         self.outcome.checkpoints.iter().filter(is_here)
     }
 
-    /// What is compared, each side once; where nothing is, all arms with their first readout.
+    /// The sides of the first pair; where nothing is compared, all arms with their first readout.
     fn compared(&self) -> Vec<Side<'a>> {
         let mut all: Vec<Side<'a>> = Vec::new();
-        for one in &self.sides {
+        for one in self.sides.iter().take(1) {
             for side in [(&*one.arm, &*one.readout), (&*one.from_arm, &*one.from_readout)] {
                 if !all.contains(&side) {
                     all.push(side);
@@ -136,7 +140,9 @@ impl<'a> Part<'a> {
             }
         }
         if all.is_empty() {
-            for row in self.checkpoints().filter(|row| row.arm != "reference" && row.start != "main") {
+            for row in
+                self.checkpoints().filter(|row| row.arm != "reference" && row.start != "main")
+            {
                 if !all.iter().any(|(arm, _)| *arm == row.arm) {
                     all.push((&row.arm, &row.readout));
                 }
@@ -148,21 +154,21 @@ impl<'a> Part<'a> {
     /// The measure that the thesis shows: rewards of the mountain car, else the task's own.
     fn measure(&self, start: &str) -> Option<(&'a str, Axis)> {
         let yard = yardstick(&self.outcome.task);
-        let mut names = self.checkpoints().filter(|row| row.start == start).map(|row| &*row.measure);
+        let mut names =
+            self.checkpoints().filter(|row| row.start == start).map(|row| &*row.measure);
         if self.is_mountain_car() {
             let name = names.find(|name| *name == "mean_return")?;
             return Some((name, Axis::new("reward of a rollout", "")));
         }
-        let named = |name: &&str| *name == format!("mean_{}", yard.word) || name.starts_with("mean_");
+        let named =
+            |name: &&str| *name == format!("mean_{}", yard.word) || name.starts_with("mean_");
         Some((names.find(named)?, Axis::new(yard.name, yard.unit)))
     }
 
     fn each_tenth(&self, start: &str, is_first: bool) -> Option<Figure> {
         let (measure, y) = self.measure(start)?;
-        let rows: Vec<&Checkpoint> = self
-            .checkpoints()
-            .filter(|row| row.start == start && row.measure == measure)
-            .collect();
+        let rows: Vec<&Checkpoint> =
+            self.checkpoints().filter(|row| row.start == start && row.measure == measure).collect();
         let mut series = Vec::new();
         for (at, (arm, readout)) in self.compared().into_iter().enumerate() {
             let of = rows.iter().filter(|row| (&*row.arm, &*row.readout) == (arm, readout));
@@ -192,7 +198,7 @@ impl<'a> Part<'a> {
         caption.thesis = caption.thesis.replace("like like", "like");
         (!series.is_empty()).then(|| Figure {
             caption,
-            x: Axis::new("part of main", "%").from(0.0, 100.0),
+            x: Axis::new("part of main", "%").from(0.0, 103.0),
             y,
             content: Content::Series(series),
         })
@@ -200,7 +206,7 @@ impl<'a> Part<'a> {
 
     fn generalisation(&self) -> Vec<Figure> {
         let curve = |of: fn(&super::gather::Difference) -> f64| {
-            let series = self.sides.iter().enumerate().map(|(at, sides)| {
+            let series = self.sides.iter().take(MOST_PAIRS).enumerate().map(|(at, sides)| {
                 let rows = self.outcome.generalisation.iter().filter(|row| row.sides == **sides);
                 let points = rows.map(|row| (f64::from(row.checkpoint), of(row))).collect();
                 Series::new(pair(sides), Role::One(at), Mark::Linked(at), points)
@@ -212,12 +218,13 @@ impl<'a> Part<'a> {
             return Vec::new();
         }
         let relative = curve(|row| row.relative_to_best);
-        let figure = |name: &str, thesis: &str, title: &str, sentence: &str, y: &str, series| Figure {
-            caption: self.caption(name, thesis, title, sentence.to_owned()),
-            x: Axis::new("part of main", "%").from(0.0, 100.0),
-            y: Axis::new(y, ""),
-            content: Content::Series(series),
-        };
+        let figure =
+            |name: &str, thesis: &str, title: &str, sentence: &str, y: &str, series| Figure {
+                caption: self.caption(name, thesis, title, sentence.to_owned()),
+                x: Axis::new("part of main", "%").from(0.0, 103.0),
+                y: Axis::new(y, ""),
+                content: Content::Series(series),
+            };
         vec![
             figure(
                 "generalisation",
@@ -267,8 +274,10 @@ impl<'a> Part<'a> {
         let (series, sentence, thesis) = if let Some(run) = best {
             let points = self.curves().filter(|point| point.run == run);
             let points = points.map(|p| (f64::from(p.episode), 100.0 * of(p))).collect();
-            let series = Series::new("best simultaneous run", Role::Simultaneous, Mark::Line, points);
-            let sentence = format!("The {label} during main in the best simultaneous run (run {run}).");
+            let series =
+                Series::new("best simultaneous run", Role::Simultaneous, Mark::Line, points);
+            let sentence =
+                format!("The {label} during main in the best simultaneous run (run {run}).");
             (vec![series], sentence, thesis.to_owned())
         } else {
             let mut arms: BTreeMap<&str, BTreeMap<u32, Vec<f64>>> = BTreeMap::new();
@@ -286,7 +295,8 @@ impl<'a> Part<'a> {
                 let mark = if at % 2 == 0 { Mark::Dashed } else { Mark::Line };
                 Series::new(arm, role(arm, at), mark, points).within(spread)
             });
-            let sentence = format!("The {label} during main, mean ± standard deviation over seeds.");
+            let sentence =
+                format!("The {label} during main, mean ± standard deviation over seeds.");
             (series.collect(), sentence, format!("like {thesis}"))
         };
         let mut caption = self.caption(what, &thesis, &words::heading(label), sentence);

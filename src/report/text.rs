@@ -27,11 +27,8 @@ pub fn lines(report: &Report) -> Vec<String> {
 #[must_use]
 pub fn of_item(item: &Item) -> Vec<String> {
     let caption = item.caption();
-    let thesis = if caption.thesis.is_empty() {
-        String::new()
-    } else {
-        format!(" ({})", caption.thesis)
-    };
+    let thesis =
+        if caption.thesis.is_empty() { String::new() } else { format!(" ({})", caption.thesis) };
     let mut lines = vec![
         String::new(),
         format!("{}{thesis} · {}", caption.title, caption.preset),
@@ -170,7 +167,10 @@ mod tests {
         };
         let lines = of_figure(&figure);
         assert_eq!(lines[0], "  time (s) along rollout");
-        assert!(lines[1].starts_with("  all  ▁▁▁▁▁▁▁▁▂") && lines[1].ends_with("█  0 to 59.0"), "{lines:?}");
+        assert!(
+            lines[1].starts_with("  all  ▁▁▁▁▁▁▁▁▂") && lines[1].ends_with("█  0 to 59.0"),
+            "{lines:?}"
+        );
     }
 
     #[test]

@@ -20,10 +20,7 @@ pub use page::{Bench, show};
 #[derive(Clone, Debug)]
 enum Leaf {
     /// Sentences.
-    Words {
-        title: String,
-        lines: Vec<String>,
-    },
+    Words { title: String, lines: Vec<String> },
     /// A figure or a table.
     Item(Box<Item>),
 }
@@ -52,7 +49,7 @@ pub enum Reaction {
 /// The state of the screen.
 #[derive(Clone, Debug)]
 pub struct Pages {
-    pages: Vec<Page>,
+    all: Vec<Page>,
     at: usize,
     /// Lines of a long page that are passed over.
     scrolled: usize,
@@ -80,13 +77,13 @@ impl Pages {
             let Section { title, notes, items } = section;
             let words = Leaf::Words { title: title.clone(), lines: notes.clone() };
             let leaves = items.iter().map(|item| Leaf::Item(Box::new(item.clone())));
-            pages.extend(
-                std::iter::once(words)
-                    .chain(leaves)
-                    .map(|leaf| Page { part: title.clone(), number, leaf }),
-            );
+            pages.extend(std::iter::once(words).chain(leaves).map(|leaf| Page {
+                part: title.clone(),
+                number,
+                leaf,
+            }));
         }
-        Self { pages, at: 0, scrolled: 0, message: None, help_open: false }
+        Self { all: pages, at: 0, scrolled: 0, message: None, help_open: false }
     }
 
     /// Does what `key` asks for.
@@ -106,7 +103,7 @@ impl Pages {
             Action::Up => self.scrolled = self.scrolled.saturating_sub(1),
             Action::Help => self.help_open = true,
             Action::Quit | Action::QuitNow => return Reaction::Quit,
-            Action::Save => match self.pages.get(self.at).map(|page| &page.leaf) {
+            Action::Save => match self.all.get(self.at).map(|page| &page.leaf) {
                 Some(Leaf::Item(item)) => return Reaction::Save(item.clone()),
                 _ => self.say("nothing to save here: turn to a figure or a table"),
             },
@@ -116,24 +113,24 @@ impl Pages {
     }
 
     fn turn_to(&mut self, page: usize) {
-        self.at = page.min(self.pages.len().saturating_sub(1));
+        self.at = page.min(self.all.len().saturating_sub(1));
         self.scrolled = 0;
     }
 
     fn here(&self) -> usize {
-        self.pages.get(self.at).map_or(0, |page| page.number)
+        self.all.get(self.at).map_or(0, |page| page.number)
     }
 
     fn turn_to_part(&mut self, fits: impl Fn(usize, usize) -> bool) {
         let here = self.here();
-        if let Some(page) = self.pages.iter().position(|page| fits(page.number, here)) {
+        if let Some(page) = self.all.iter().position(|page| fits(page.number, here)) {
             self.turn_to(page);
         }
     }
 
     /// To the first page of this part, or from there to that of the part before.
     fn turn_to_part_before(&mut self) {
-        let first = |number: usize| self.pages.iter().position(|page| page.number == number);
+        let first = |number: usize| self.all.iter().position(|page| page.number == number);
         let here = self.here();
         let target = match first(here) {
             Some(page) if page < self.at => Some(page),
@@ -162,8 +159,8 @@ pub fn draw(frame: &mut Frame<'_>, pages: &mut Pages, look: Look) {
 
 fn draw_page(pen: &mut Pen<'_>, pages: &mut Pages) {
     let (width, height) = (pen.width(), pen.height());
-    let Some(page) = pages.pages.get(pages.at) else { return };
-    let place = format!("page {} of {}", pages.at + 1, pages.pages.len());
+    let Some(page) = pages.all.get(pages.at) else { return };
+    let place = format!("page {} of {}", pages.at + 1, pages.all.len());
     let room = usize::from(width.saturating_sub(columns(&place) + 4));
     pen.text(1, 0, &cut(&page.part, room), Role::Strong);
     pen.text_until(width - 1, 0, &place, Role::Dim);
@@ -222,8 +219,10 @@ fn table_lines(item: &Item, table: &Table, width: usize) -> Vec<String> {
     lines.push(caption.preset.clone());
     lines.extend(wrapped(&caption.sentence, width));
     lines.push(String::new());
-    let flat: Vec<String> =
-        text::columns(table).into_iter().map(|line| line.trim_start_matches("  ").to_owned()).collect();
+    let flat: Vec<String> = text::columns(table)
+        .into_iter()
+        .map(|line| line.trim_start_matches("  ").to_owned())
+        .collect();
     if flat.iter().all(|line| line.chars().count() <= width) {
         lines.extend(flat);
         return lines;
@@ -266,7 +265,8 @@ mod tests {
     }
 
     fn report() -> Report {
-        let points = |slope: f64| (0..=100).map(|x| f64::from(x)).map(|x| (x, 1.0 + slope * x));
+        let points =
+            |slope: f64| (0..=100).map(move |x| (f64::from(x), 1.0 + slope * f64::from(x)));
         let figure = Figure {
             caption: caption("figure", "figure 31"),
             x: Axis::new("rollout", ""),

@@ -62,7 +62,14 @@ fn sample(svg: &mut String, series: &Series, x: f64, y: f64) {
     }
 }
 
-fn path(svg: &mut String, ink: &str, x: f64, y: f64, shape: &str, is_filled: bool) -> std::fmt::Result {
+fn path(
+    svg: &mut String,
+    ink: &str,
+    x: f64,
+    y: f64,
+    shape: &str,
+    is_filled: bool,
+) -> std::fmt::Result {
     if is_filled {
         write!(svg, "<path d=\"M{x:.1} {y:.1}{shape}\" fill=\"{ink}\"/>")
     } else {

@@ -13,6 +13,9 @@ pub struct Field {
     norms: Vec<f64>,
 }
 
+/// A centre and its metric.
+type Shape = (Vec<f64>, Vec<f64>);
+
 /// Directions in which an outline is traced.
 const DIRECTIONS: u32 = 36;
 
@@ -20,7 +23,7 @@ impl Field {
     /// The fields of `model`, those of its first output.
     #[must_use]
     pub fn all(model: &Model) -> Vec<Self> {
-        let (norms, shapes): (&[f64], Vec<(Vec<f64>, Vec<f64>)>) = match model {
+        let (norms, shapes): (&[f64], Vec<Shape>) = match model {
             Model::Rfwr(rfwr) => (
                 &rfwr.settings().norm_in,
                 (0..rfwr.fields()).map(|k| (rfwr.centre(k), rfwr.metric(k))).collect(),

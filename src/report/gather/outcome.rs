@@ -190,17 +190,19 @@ impl Outcome {
                 }
                 Err(error) => {
                     let line = error.position().map_or(0, csv::Position::line);
-                    let is_io = error.is_io_error();
                     bad += 1;
                     faults.get_or_insert((line, error.to_string()));
-                    if is_io {
+                    // What the disk does not give now it will not give later.
+                    if error.is_io_error() {
                         break;
                     }
                 }
             }
         }
         if let Some((line, why)) = faults {
-            let why = format!("{bad} of its rows cannot be used, the first in line {line} ({why}): left out");
+            let why = format!(
+                "{bad} of its rows cannot be used, the first in line {line} ({why}): left out"
+            );
             self.left_out.push(LeftOut { path: path.display().to_string(), why });
         }
         rows
@@ -231,6 +233,10 @@ fn cell(record: &csv::StringRecord, head: &csv::StringRecord) -> csv::Result<Cel
         at.and_then(|at| record.get(at)).unwrap_or_default().to_owned()
     };
     let number = |at: usize| record.get(at).and_then(|cell| cell.parse().ok());
+    let normalised_return: f64 = match text("normalised_return").parse() {
+        Ok(value) => value,
+        Err(_) => return Err(std::io::Error::other("normalised_return is no number").into()),
+    };
     let sides = Sides {
         setting: text("setting"),
         operator: text("operator"),
@@ -241,11 +247,7 @@ fn cell(record: &csv::StringRecord, head: &csv::StringRecord) -> csv::Result<Cel
         from_readout: text("from_readout"),
     };
     let first = head.iter().position(|column| column == "index").map_or(0, |index| index + 1);
-    Ok(CellDifference {
-        sides,
-        place: number(first).zip(number(first + 1)),
-        normalised_return: text("normalised_return").parse().unwrap_or(f64::NAN),
-    })
+    Ok(CellDifference { sides, place: number(first).zip(number(first + 1)), normalised_return })
 }
 
 fn driven(record: &csv::StringRecord, _: &csv::StringRecord) -> csv::Result<Driven> {
@@ -268,7 +270,8 @@ mod tests {
 
     #[test]
     fn task_and_preset_are_found_in_the_profile() {
-        let identity = r#"["0.1.0",{},["(\n    task: \"mountain-car\",\n    preset: \"thesis\",\n"]]"#;
+        let identity =
+            r#"["0.1.0",{},["(\n    task: \"mountain-car\",\n    preset: \"thesis\",\n"]]"#;
         assert_eq!(after(identity, "preset").as_deref(), Some("thesis"));
         assert_eq!(after(identity, "task").as_deref(), Some("mountain-car"));
         assert_eq!(after(identity, "mode"), None);

@@ -163,10 +163,15 @@ impl Recorded {
         match read_evaluation(&path) {
             Ok(rows) => {
                 let all = rows.len();
-                self.tenths = rows.into_iter().filter_map(tenth).collect();
+                self.tenths = rows.iter().filter_map(tenth).collect();
                 if self.tenths.len() < all {
                     let lost = all - self.tenths.len();
-                    self.leave_out(&path, format!("{lost} of its rows hold no finite numbers, or name no tenth: left out"));
+                    self.leave_out(
+                        &path,
+                        format!(
+                            "{lost} of its rows hold no finite numbers, or name no tenth: left out"
+                        ),
+                    );
                 }
                 self.mind_the_end(&path);
             }
@@ -210,7 +215,7 @@ impl Recorded {
 }
 
 /// The rollout of a policy after some percent of main.
-fn tenth(row: EvaluationRow) -> Option<(u8, EpisodeRow)> {
+fn tenth(row: &EvaluationRow) -> Option<(u8, EpisodeRow)> {
     let percent = row.policy.strip_prefix("policy-")?.parse().ok()?;
     let rollout = EpisodeRow {
         phase: Phase::Autonomous,

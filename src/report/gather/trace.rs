@@ -45,10 +45,19 @@ pub struct Portrait {
 pub struct RegionTrack {
     /// Its name.
     pub name: String,
-    /// Controlled time of main, s,
-    /// success (none before it is known),
-    /// and the person's share.
-    pub moments: Vec<(f64, Option<f64>, f64)>,
+    /// Some moments of main in it.
+    pub moments: Vec<Moment>,
+}
+
+/// A moment of main.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// Controlled time of main, s.
+    pub t: f64,
+    /// The region's success; none before it is known.
+    pub success: Option<f64>,
+    /// The person's share.
+    pub share: f64,
 }
 
 /// The actions of a tick.
@@ -138,7 +147,10 @@ impl Trace {
     ) -> Result<(Self, Spoilt), Error> {
         let thinning = Phase::ALL.map(|phase| Thinning::of(rows, phase, points));
         let of_phase = |phase: Phase| {
-            Phase::ALL.iter().position(|other| *other == phase).map_or_else(Thinning::default, |at| thinning[at])
+            Phase::ALL
+                .iter()
+                .position(|other| *other == phase)
+                .map_or_else(Thinning::default, |at| thinning[at])
         };
         let main = rows.iter().filter(|row| row.phase == Phase::Main);
         let apart = main.map(|row| row.duration_s).sum::<f64>() / MOMENTS;
@@ -193,16 +205,15 @@ impl Trace {
         }
         closing.push_back(acted());
         let name = row.region();
-        let track = match self.regions.iter().position(|region| region.name == name) {
-            Some(at) => &mut self.regions[at],
-            None => {
-                self.regions.push(RegionTrack { name: name.to_owned(), moments: Vec::new() });
-                let last = self.regions.len() - 1;
-                &mut self.regions[last]
-            }
-        };
-        if track.moments.last().is_none_or(|(last, ..)| t - last >= apart) {
-            track.moments.push((t, row.number(Number::Success), share));
+        let at = self.regions.iter().position(|region| region.name == name);
+        let at = at.unwrap_or_else(|| {
+            self.regions.push(RegionTrack { name: name.to_owned(), moments: Vec::new() });
+            self.regions.len() - 1
+        });
+        let track = &mut self.regions[at];
+        if track.moments.last().is_none_or(|last| t - last.t >= apart) {
+            let success = row.number(Number::Success);
+            track.moments.push(Moment { t, success, share });
         }
     }
 }
@@ -210,7 +221,8 @@ impl Trace {
 impl Portrait {
     fn take(&mut self, row: &Row<'_>, step: u32, before: usize, thin: Thinning, plane: &Plane) {
         (self.of, self.every) = (self.of.max(before + 1).max(thin.of), thin.ticks.max(1));
-        if before % thin.rollouts.max(1) != 0 || step as usize % self.every != 0 {
+        let is_shown = before.is_multiple_of(thin.rollouts.max(1));
+        if !is_shown || !(step as usize).is_multiple_of(self.every) {
             return;
         }
         if step == 0 || self.tracks.is_empty() {
@@ -253,8 +265,8 @@ mod tests {
 
     #[test]
     fn a_discarded_attempt_is_not_shown_and_takes_no_time() {
-        let rows =
-            [(1, End::Failed), (2, End::Discarded), (2, End::Failed)].map(|(n, end)| rollout(n, 2, end));
+        let rows = [(1, End::Failed), (2, End::Discarded), (2, End::Failed)]
+            .map(|(n, end)| rollout(n, 2, end));
         let mut text = "phase,episode,step,t,x,x_dot,theta,theta_dot,u_human,u_machine,share,u,\
                         u_applied,reward,success,region,lateness_us\n"
             .to_owned();

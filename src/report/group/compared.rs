@@ -108,7 +108,8 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
     if arms.iter().any(Vec::is_empty) {
         return Compared { table: None, sentences: Vec::new() };
     }
-    let is_simulated = group.sessions.iter().all(|session| session.operator.starts_with("simulated"));
+    let is_simulated =
+        group.sessions.iter().all(|session| session.operator.starts_with("simulated"));
     let pairing = Pairing::of(&arms, is_simulated);
     let (mut rows, mut sentences) = (Vec::new(), Vec::new());
     for (name, of) in measures(group.task) {
@@ -182,9 +183,10 @@ fn row(
         None => vec![nothing; 6],
         Some(compared) => vec![
             format!("{:+.decimals$}", compared.difference),
-            compared
-                .interval95
-                .map_or_else(|| nothing.clone(), |(a, b)| format!("{a:+.decimals$} to {b:+.decimals$}")),
+            compared.interval95.map_or_else(
+                || nothing.clone(),
+                |(a, b)| format!("{a:+.decimals$} to {b:+.decimals$}"),
+            ),
             compared.hedges_g.map_or_else(|| nothing.clone(), |g| format!("{g:+.2}")),
             test(compared.test),
             format!("{:.3}", compared.p),
@@ -197,7 +199,9 @@ fn row(
 fn test(test: Test) -> String {
     match test {
         Test::Permutation { arrangements } => format!("exact permutation, {arrangements} ways"),
-        Test::PairedPermutation { arrangements } => format!("exact sign flips, {arrangements} ways"),
+        Test::PairedPermutation { arrangements } => {
+            format!("exact sign flips, {arrangements} ways")
+        }
         Test::Welch { t, df } => format!("Welch t = {t:.2}, df = {df:.1}"),
         Test::PairedT { t, df } => format!("paired t = {t:.2}, df = {df:.0}"),
     }

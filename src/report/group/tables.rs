@@ -89,7 +89,8 @@ pub(super) fn regions(group: &Group<'_>) -> Option<Table> {
         let most = speeds.1.map_or_else(|| "–".to_owned(), |most| most.to_string());
         vec![name.to_owned(), cos(angles.0), cos(angles.1), speeds.0.to_string(), most, cos(goal)]
     };
-    let (down, top_slow, top_fast) = (rule("down_deg")?, rule("top_slow_deg")?, rule("top_fast_deg")?);
+    let (down, top_slow, top_fast) =
+        (rule("down_deg")?, rule("top_slow_deg")?, rule("top_fast_deg")?);
     let fast = (rule("down_fast_rad_s")?, rule("middle_fast_rad_s")?, rule("top_fast_rad_s")?);
     Some(Table {
         caption: caption(
@@ -113,7 +114,12 @@ pub(super) fn regions(group: &Group<'_>) -> Option<Table> {
         rows: vec![
             row("Down slow", (180.0, down), (0.0, Some(fast.0)), rule("down_slow_goal_deg")?),
             row("Down fast", (180.0, down), (fast.0, None), rule("down_fast_goal_deg")?),
-            row("Middle slow", (down, top_slow), (0.0, Some(fast.1)), rule("middle_slow_goal_deg")?),
+            row(
+                "Middle slow",
+                (down, top_slow),
+                (0.0, Some(fast.1)),
+                rule("middle_slow_goal_deg")?,
+            ),
             row("Middle fast", (down, top_fast), (fast.1, None), rule("middle_fast_goal_deg")?),
             row("Top slow", (top_slow, 0.0), (0.0, Some(fast.2)), rule("top_slow_goal_deg")?),
             row("Top fast", (top_fast, 0.0), (fast.2, None), rule("top_fast_goal_deg")?),

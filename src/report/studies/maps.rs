@@ -10,6 +10,11 @@ use crate::report::words;
 /// Cells along an axis beyond which several are drawn as one.
 const MOST_CELLS: usize = 50;
 
+/// A cell by position and velocity, and its number.
+type Place = (usize, usize, f64);
+/// An arm and its best run.
+type Best<'a> = (&'a str, u32);
+
 impl Part<'_> {
     /// The position and the velocity of the mountain car.
     fn plane(&self) -> (Axis, Axis) {
@@ -20,14 +25,14 @@ impl Part<'_> {
 
     pub(super) fn values(&self) -> Vec<Figure> {
         let here: BTreeSet<u32> = self.curves().map(|point| point.run).collect();
-        let mut arms: BTreeMap<(&str, u32), Vec<(usize, usize, f64)>> = BTreeMap::new();
+        let mut arms: BTreeMap<Best<'_>, Vec<Place>> = BTreeMap::new();
         for row in &self.outcome.values {
             if row.setting == self.setting && here.contains(&row.run) {
                 let cells = arms.entry((&row.arm, row.run)).or_default();
                 cells.push((row.position_cell, row.velocity_cell, row.value));
             }
         }
-        let figure = |((arm, run), cells): ((&str, u32), Vec<(usize, usize, f64)>)| {
+        let figure = |((arm, run), cells): (Best<'_>, Vec<Place>)| {
             let (rows, merged) = raster(&cells);
             let (thesis, name) = match arm {
                 "simultaneous" => ("figure 47", "value-simultaneous".to_owned()),
@@ -101,7 +106,8 @@ impl Part<'_> {
         );
         let title = "Difference of normalised reward, start by start";
         // Single starts whose best is near 0 would leave the others without colour.
-        let rows = rows.into_iter().map(|row| row.into_iter().map(|v| v.clamp(-1.0, 1.0)).collect());
+        let rows =
+            rows.into_iter().map(|row| row.into_iter().map(|v| v.clamp(-1.0, 1.0)).collect());
         let label = "difference".to_owned();
         Some(Figure {
             caption: self.caption("start-by-start", "figure 49", title, sentence),
@@ -132,7 +138,8 @@ impl Part<'_> {
             for (at, (arm, readout)) in compared.into_iter().enumerate() {
                 let Some(run) = best.get(arm) else { continue };
                 let is_this = |row: &&Driven| {
-                    (row.run, &*row.readout, &*row.start, row.index) == (*run, readout, start, index)
+                    (row.run, &*row.readout, &*row.start, row.index)
+                        == (*run, readout, start, index)
                 };
                 let path: Vec<(f64, f64)> = self
                     .outcome
@@ -156,14 +163,26 @@ impl Part<'_> {
                  ({from_x:.2}, {from_y:.3}), a start that {trained}."
             );
             let thesis = number.map_or(String::new(), |number| format!("figure {number}"));
-            let title = if is_trained { "Trajectory from the trained start" } else { "Trajectory from another start" };
+            let title = if is_trained {
+                "Trajectory from the trained start"
+            } else {
+                "Trajectory from another start"
+            };
             let (x, y) = self.plane();
-            figures.push((number, Figure {
-                caption: self.caption(&format!("driven-{start}-{index}"), &thesis, title, sentence),
-                x,
-                y,
-                content: Content::Series(series),
-            }));
+            figures.push((
+                number,
+                Figure {
+                    caption: self.caption(
+                        &format!("driven-{start}-{index}"),
+                        &thesis,
+                        title,
+                        sentence,
+                    ),
+                    x,
+                    y,
+                    content: Content::Series(series),
+                },
+            ));
         }
         figures.sort_by_key(|(number, _)| number.unwrap_or(u32::MAX));
         figures.into_iter().map(|(_, figure)| figure).collect()
@@ -172,7 +191,7 @@ impl Part<'_> {
 
 /// The cells as rows from below, several together where they are too many: the largest of them; and
 /// how many along each axis.
-fn raster(cells: &[(usize, usize, f64)]) -> (Vec<Vec<f64>>, usize) {
+fn raster(cells: &[Place]) -> (Vec<Vec<f64>>, usize) {
     let columns = cells.iter().map(|cell| cell.0 + 1).max().unwrap_or(0);
     let rows = cells.iter().map(|cell| cell.1 + 1).max().unwrap_or(0);
     let merged = columns.max(rows).div_ceil(MOST_CELLS).max(1);
@@ -191,7 +210,7 @@ mod tests {
     #[test]
     fn many_cells_are_drawn_as_few() {
         assert_eq!(raster(&[(0, 0, 1.0), (1, 0, 2.0)]), (vec![vec![1.0, 2.0]], 1));
-        let many: Vec<(usize, usize, f64)> =
+        let many: Vec<Place> =
             (0..100).map(|at| (at, 0, crate::report::figure::real(at))).collect();
         let (rows, merged) = raster(&many);
         assert_eq!((merged, rows[0].len(), rows[0][0], rows[0][49]), (2, 50, 1.0, 99.0));

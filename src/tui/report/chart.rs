@@ -64,7 +64,8 @@ fn look_of(series: &Series, at: usize, glyphs: Glyphs) -> (Role, Marker, char) {
         Mark::Dashed => (role, Marker::Custom('-'), '-'),
         Mark::Dotted => (role, Marker::Custom('\''), '\''),
         Mark::Shape(shape) | Mark::Linked(shape) => {
-            let sign = SIGNS[(shape + usize::from(matches!(series.role, Meaning::One(_))) * at) % 6];
+            let sign =
+                SIGNS[(shape + usize::from(matches!(series.role, Meaning::One(_))) * at) % 6];
             (role, Marker::Custom(sign), sign)
         }
     }
@@ -92,6 +93,9 @@ fn legend(pen: &Pen<'_>, series: &[Series]) -> Vec<Vec<(String, Role)>> {
     lines
 }
 
+/// What is drawn with one sign.
+type Curve = (Role, Marker, GraphType, Vec<(f64, f64)>);
+
 fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
     let all = || series.iter().flat_map(Series::pieces).flatten();
     let x = bounds(&figure.x, all().map(|point| point.0));
@@ -99,7 +103,7 @@ fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
     let ys = all().map(|point| point.1).chain(spreads.flat_map(|(a, b)| [*a, *b]));
     let (least, most) = bounds(&figure.y, ys);
     let y = (figure.ground().unwrap_or(least), most);
-    let mut drawn: Vec<(Role, Marker, GraphType, Vec<(f64, f64)>)> = Vec::new();
+    let mut drawn: Vec<Curve> = Vec::new();
     for (at, one) in series.iter().enumerate() {
         let (role, marker, _) = look_of(one, at, pen.look.glyphs);
         let is_line = matches!(one.mark, Mark::Line | Mark::Thin);
@@ -120,11 +124,7 @@ fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
         }
     }
     let data = drawn.iter().map(|(role, marker, kind, points)| {
-        Dataset::default()
-            .marker(*marker)
-            .graph_type(*kind)
-            .style(pen.style(*role))
-            .data(points)
+        Dataset::default().marker(*marker).graph_type(*kind).style(pen.style(*role)).data(points)
     });
     let area = pen.area();
     let chart = Chart::new(data.collect())
