@@ -1,5 +1,7 @@
 //! The words of the command line.
 
+mod report;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, value_parser};
@@ -8,6 +10,8 @@ use crate::profile::Order;
 use crate::session::BadSubject;
 use crate::session::plan::MOST_ROLLOUTS;
 use crate::study::batch::Shard;
+
+pub use report::Report;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -282,35 +286,6 @@ pub struct Merge {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Print one JSON object instead of tables.
-    #[arg(long)]
-    pub json: bool,
-}
-
-const REPORT_EXAMPLES: &str = "\
-Examples:
-  coadapt report logs                           all sessions and studies below it, on this terminal
-  coadapt report logs --out report.html         the same as one page for a browser
-  coadapt report logs/S07 logs/S08 --csv data   the data and an SVG of each figure, into a folder
-  coadapt report logs --json > report.json
-
-On a terminal the arrows turn the pages, s saves a figure (SVG and CSV), q ends; elsewhere the
-report is plain text. What cannot be used is named and left out. Groups are of one task, preset,
-profile and kind of operator; only complete sessions count in them, and each subject once.";
-
-/// The words of `report`.
-#[derive(Args, Debug)]
-#[command(after_help = REPORT_EXAMPLES)]
-pub struct Report {
-    /// Folders of sessions and studies, or above some.
-    #[arg(required = true, value_name = "DIR")]
-    pub folders: Vec<PathBuf>,
-    /// Write one self-contained HTML page.
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-    /// Write the data of each figure and table, and each figure as SVG, into this folder.
-    #[arg(long, value_name = "DIR")]
-    pub csv: Option<PathBuf>,
-    /// Print one JSON object.
     #[arg(long)]
     pub json: bool,
 }

@@ -8,7 +8,7 @@ mod desk;
 use std::fs;
 use std::path::Path;
 
-use desk::{Desk, text};
+use desk::{Desk, names, text};
 use serde_json::Value;
 
 /// A short session of `subject`.

@@ -156,7 +156,10 @@ fn drawn(figure: &Figure) -> String {
         .with_body_size(TEXT)
         .with_legend_box(false);
     if let Some((least, most)) = figure.x.range {
-        layout = layout.with_x_axis_min(least).with_x_axis_max(most);
+        // Room for a shape at the end.
+        let is_plane = matches!(figure.content, Content::Cells(_));
+        let beyond = if is_plane { 0.0 } else { 0.02 * (most - least) };
+        layout = layout.with_x_axis_min(least).with_x_axis_max(most + beyond);
     }
     if let Some((least, most)) = figure.y.range {
         layout = layout.with_y_axis_min(least).with_y_axis_max(most);

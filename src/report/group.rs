@@ -412,7 +412,7 @@ impl<'a> Group<'a> {
         let title = format!("{} of the robot alone after each tenth", words::heading(&axis.label));
         (!series.is_empty()).then(|| Figure {
             caption: self.caption("tenths", 37, &title, sentence),
-            x: Axis::new("part of main", "%").from(0.0, 103.0),
+            x: Axis::new("part of main", "%").from(0.0, 100.0),
             y: Axis { range: None, ..axis },
             content: Content::Series(series),
         })
@@ -461,7 +461,7 @@ impl<'a> Group<'a> {
         };
         (!series.is_empty()).then(|| Figure {
             caption: self.caption("improvement", 38, title, sentence),
-            x: Axis::new("part of main", "%").from(0.0, 103.0),
+            x: Axis::new("part of main", "%").from(0.0, 100.0),
             y,
             content: Content::Series(series),
         })

@@ -198,7 +198,7 @@ impl<'a> Part<'a> {
         caption.thesis = caption.thesis.replace("like like", "like");
         (!series.is_empty()).then(|| Figure {
             caption,
-            x: Axis::new("part of main", "%").from(0.0, 103.0),
+            x: Axis::new("part of main", "%").from(0.0, 100.0),
             y,
             content: Content::Series(series),
         })
@@ -221,7 +221,7 @@ impl<'a> Part<'a> {
         let figure =
             |name: &str, thesis: &str, title: &str, sentence: &str, y: &str, series| Figure {
                 caption: self.caption(name, thesis, title, sentence.to_owned()),
-                x: Axis::new("part of main", "%").from(0.0, 103.0),
+                x: Axis::new("part of main", "%").from(0.0, 100.0),
                 y: Axis::new(y, ""),
                 content: Content::Series(series),
             };

@@ -257,8 +257,8 @@ pub const BINDINGS: &[Binding] = {
             A::Next,
         ),
         bind(Report, &[Left, BackTab, Char('h')], "", "", "the page before", A::Previous),
-        bind(Report, &[Down, Char('j')], "↓↑", "scroll", "more of a long page; ↑ back", A::Down),
-        bind(Report, &[Up, Char('k')], "", "", "back up", A::Up),
+        bind(Report, &[Down], "↓↑", "scroll", "more of a long page; ↑ back", A::Down),
+        bind(Report, &[Up], "", "", "back up", A::Up),
         bind(
             Report,
             &[Char('n')],

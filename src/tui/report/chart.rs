@@ -12,6 +12,8 @@ use crate::tui::palette::{Glyphs, Role};
 use crate::tui::pen::{Pen, columns};
 use crate::tui::text::{cut, wrapped};
 
+/// Above so many points of a series its spread would hide all else.
+const MOST_BARS: usize = 12;
 /// Steps between the dots of a dotted line, parts of the chart's width.
 const DOTS: f64 = 60.0;
 
@@ -19,7 +21,9 @@ const DOTS: f64 = 60.0;
 pub(super) fn draw(pen: &mut Pen<'_>, figure: &Figure) {
     let (width, height) = (pen.width(), pen.height());
     pen.text(0, 0, &heading(&figure.caption), Role::Strong);
-    pen.text(0, 1, &figure.caption.preset, Role::Dim);
+    let axes = format!("   ↑ {}   → {}", figure.y.title(), figure.x.title());
+    let after = pen.text(0, 1, &figure.caption.preset, Role::Dim);
+    pen.text(after, 1, &axes, Role::Dim);
     let sentence = wrapped(&figure.caption.sentence, usize::from(width));
     let legend = match &figure.content {
         Content::Series(series) => legend(pen, series),
@@ -117,6 +121,7 @@ fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
         }
         if let Some(spread) = &one.spread
             && spread.len() == one.points.len()
+            && spread.len() <= MOST_BARS
         {
             let ends = one.points.iter().zip(spread);
             let ends = ends.flat_map(|((x, _), (a, b))| [(*x, *a), (*x, *b)]).collect();
@@ -162,9 +167,16 @@ fn axis<'a>(pen: &Pen<'_>, axis: &'a Axis, (least, most): (f64, f64)) -> ChartAx
     let labels: Vec<Line<'_>> = if axis.names.is_empty() {
         [least, f64::midpoint(least, most), most].map(|value| Line::raw(short(value))).to_vec()
     } else {
-        axis.names.iter().map(|(_, name)| Line::raw(name.clone())).collect()
+        let names = axis.names.iter().map(|(_, name)| Line::raw(name.clone()));
+        // Labels stand evenly apart: where half a place is left at both ends, so are blanks.
+        if axis.range.is_some() {
+            let blank = || std::iter::once(Line::default());
+            blank().chain(names.flat_map(|name| [name, Line::default()])).collect()
+        } else {
+            names.collect()
+        }
     };
-    ChartAxis::default().title(axis.title()).bounds([least, most]).labels(labels).style(style)
+    ChartAxis::default().bounds([least, most]).labels(labels).style(style)
 }
 
 /// Signs for cells, from the least to the most.
