@@ -178,9 +178,9 @@ impl<'a> Group<'a> {
             series.push(Series::new(mode.word(), role(mode), line(mode), points).within(band));
         }
         let sentence = format!(
-            "The mean {} over the subjects of each group in each rollout of main, ± one standard \
+            "The {} over the subjects of each group in each rollout of main, ± one standard \
              deviation over subjects ({}).",
-            axis.label,
+            words::mean_of(&axis.label),
             self.sizes()
         );
         let title = format!("{} of each group", words::heading(&axis.label));
@@ -204,8 +204,8 @@ impl<'a> Group<'a> {
         }
         series.retain(|one| !one.points.is_empty());
         let sentence = format!(
-            "The moving average (window {WINDOW}) of the mean {} of each group ({}).",
-            axis.label,
+            "The moving average (window {WINDOW}) of the {} of each group ({}).",
+            words::mean_of(&axis.label),
             self.sizes()
         );
         let title = format!("{} of each group, moving average", words::heading(&axis.label));
@@ -314,8 +314,8 @@ impl<'a> Group<'a> {
         }
         let most = real(names.len()) + 0.5;
         let sentence = format!(
-            "The mean {} of the final policies alone, ± one standard deviation over subjects: {}.",
-            axis.label,
+            "The {} of the final policies alone, ± one standard deviation over subjects: {}.",
+            words::mean_of(&axis.label),
             told.join("; ")
         );
         let title = format!("{} of the robot alone, each group", words::heading(&axis.label));
@@ -353,9 +353,9 @@ impl<'a> Group<'a> {
         }
         let number = if self.task == SwingUp::NAME { 10 } else { 36 };
         let sentence = format!(
-            "The mean {} of each subject's final policy alone, the subjects of each group sorted \
+            "The {} of each subject's final policy alone, the subjects of each group sorted \
              from the worst to the best; the dashed line is what nobody at the controls comes to.",
-            axis.label
+            words::mean_of(&axis.label)
         );
         let title = format!("{} of the robot alone, subjects sorted", words::heading(&axis.label));
         let mut caption = self.caption("sorted", number, &title, sentence);
@@ -405,9 +405,9 @@ impl<'a> Group<'a> {
             }
         }
         let sentence = format!(
-            "The mean {} of each subject's robot alone after each tenth of main; colours tell the \
+            "The {} of each subject's robot alone after each tenth of main; colours tell the \
              groups apart, shapes the subjects.",
-            axis.label
+            words::mean_of(&axis.label)
         );
         let title = format!("{} of the robot alone after each tenth", words::heading(&axis.label));
         (!series.is_empty()).then(|| Figure {

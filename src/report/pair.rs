@@ -73,9 +73,9 @@ fn averages(views: [View<'_>; 2]) -> Option<Figure> {
     let [sequential, simultaneous] = last;
     let axis = measure(task);
     let sentence = format!(
-        "The mean {} of each {WINDOW} rollouts in a row; the last ones come to {} in sequential \
+        "The {} of each {WINDOW} rollouts in a row; the last ones come to {} in sequential \
          and {} in simultaneous mode.",
-        axis.label,
+        words::mean_of(&axis.label),
         with_unit(task, sequential?),
         with_unit(task, simultaneous?)
     );

@@ -72,7 +72,7 @@ fn shown(portrait: &Portrait) -> String {
     };
     match portrait.every {
         0 | 1 => all,
-        every => format!("{all}, each {every}th tick"),
+        every => format!("{all}, one tick in {every}"),
     }
 }
 

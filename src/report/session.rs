@@ -205,9 +205,9 @@ impl View<'_> {
                 &self.of_balance(15, 15),
                 &format!("{}, moving average", words::heading(&axis.label)),
                 format!(
-                    "The mean {} of each {WINDOW} rollouts in a row: {} in the first {WINDOW}, {} \
+                    "The {} of each {WINDOW} rollouts in a row: {} in the first {WINDOW}, {} \
                      in the last {WINDOW}.",
-                    axis.label,
+                    words::mean_of(&axis.label),
                     with_unit(task, first),
                     with_unit(task, last)
                 ),
@@ -350,7 +350,9 @@ impl View<'_> {
     fn by_start(&self, phase: Phase) -> Option<Figure> {
         let Recorded { task, mode, .. } = self.session;
         let points = by_start(task, &self.session.of_phase(phase));
-        if !starts_differ(&points) {
+        // Where a session runs on, a rollout of main starts wherever the one before ended.
+        let runs_on = phase == Phase::Main && goes_by_time(task);
+        if runs_on || !starts_differ(&points) {
             return None;
         }
         let average = mean(&points.iter().map(|(_, y)| *y).collect::<Vec<_>>());

@@ -189,8 +189,9 @@ impl<'a> Part<'a> {
         series.retain(|one| !one.points.is_empty());
         let what = &y.label;
         let sentence = format!(
-            "The mean {what} of the policies alone after each tenth of main, from the starts \
-             `{start}`, ± the standard error over the seeds."
+            "The {} of the policies alone after each tenth of main, from the starts \
+             `{start}`, ± the standard error over the seeds.",
+            words::mean_of(what)
         );
         let thesis = if is_first { "figure 45" } else { "like figure 45" };
         let title = format!("{} of the policies after each tenth, {start}", words::heading(what));

@@ -89,6 +89,11 @@ pub(super) fn heading(text: &str) -> String {
     })
 }
 
+/// The mean of what is called so.
+pub(super) fn mean_of(label: &str) -> String {
+    if label.starts_with("mean ") { label.to_owned() } else { format!("mean {label}") }
+}
+
 /// A count with its noun.
 pub(super) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })

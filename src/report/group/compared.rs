@@ -128,6 +128,10 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
             rows.push(row(group.task, name, [&a, &b], compared.as_ref()));
         }
     }
+    if sentences.is_empty() {
+        let few = "Too few subjects for a test: it takes at least two in each mode.";
+        sentences.push(few.to_owned());
+    }
     let (few, paired) = match pairing {
         Pairing::None => ("subjects are dealt to the modes", ""),
         Pairing::Subjects => ("differences of subjects change their sign", ", paired by subject"),

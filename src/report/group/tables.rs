@@ -7,6 +7,7 @@ use crate::report::figure::{Caption, Table};
 use crate::report::gather::Recorded;
 use crate::report::metrics::{deviation, mean};
 use crate::report::series::WINDOW;
+use crate::report::words;
 use crate::session::Phase;
 use crate::sharing::Mode;
 
@@ -72,7 +73,8 @@ pub(super) fn subjects(group: &Group<'_>) -> Option<Table> {
         "share at the end (%)".to_owned(),
         "receptive fields".to_owned(),
     ];
-    let sentence = format!("The mean {} of each subject in each part of its sessions.", yard.name);
+    let sentence =
+        format!("The {} of each subject in each part of its sessions.", words::mean_of(yard.name));
     (!rows.is_empty()).then(|| Table {
         caption: caption(group, "subjects", "", "Subjects", &sentence),
         columns: head.to_vec(),
