@@ -5,7 +5,7 @@ mod outcome;
 mod recorded;
 mod trace;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -60,8 +60,10 @@ pub fn find(folders: &[PathBuf]) -> Found {
         }
     }
     let once = |paths: &mut Vec<PathBuf>| {
+        let mut seen = BTreeSet::new();
         paths.sort();
-        paths.dedup_by_key(|path| fs::canonicalize(&*path).unwrap_or_else(|_| path.clone()));
+        // One folder may be named in several ways.
+        paths.retain(|path| seen.insert(fs::canonicalize(path).unwrap_or_else(|_| path.clone())));
     };
     once(&mut found.sessions);
     once(&mut found.studies);
