@@ -2,6 +2,7 @@
 
 mod export;
 mod look;
+mod report;
 
 use std::path::PathBuf;
 
@@ -13,6 +14,7 @@ use crate::session::plan::MOST_ROLLOUTS;
 use crate::study::batch::Shard;
 pub use export::Export;
 pub use look::{Replay, Watch};
+pub use report::Report;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -23,6 +25,7 @@ Examples:
   coadapt fit data.csv --inputs a,b --outputs u a learner on a table, offline
   coadapt study balance                         many simulated sessions, compared
   coadapt replay logs/S07/001-balance-simultaneous   watch it again; --verify compares
+  coadapt report logs --out report.html         figures, tables and statistics of all of it
   coadapt profile show balance                  every key, its value and its origin
   coadapt devices                               pads, ports, terminal; maps a gamepad
 
@@ -57,6 +60,8 @@ pub enum Command {
     Watch(Watch),
     /// A session's tables for pandas and R, or its course for Foxglove.
     Export(Export),
+    /// What came out of sessions and studies: figures, tables, statistics.
+    Report(Report),
     /// A plant open loop: a table of actions in, a table of states out.
     Simulate(Simulate),
     /// This computer's gamepad for a session at another: lines on standard output.

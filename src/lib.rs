@@ -39,7 +39,7 @@
 //! | `record` | the files of a session | `learner`, `session`, `clock`, `sharing` |
 //! | `profile` | an experiment's parameters, from a file | `plant`, `learner`, `sharing`, `teaching`, `session`, `operator`, `task`, `backend`, `record` |
 //! | `control` | the control cycle, and what others see of it | `clock`, `plant`, `learner`, `sharing`, `teaching`, `session`, `operator`, `task`, `backend`, `record` |
-//! | `report` | measures, figures, statistics | `record`, `task`, `learner`, `session`, `sharing` |
+//! | `report` | measures, figures, tables, statistics: a page of sessions and studies | `record`, `task`, `learner`, `session`, `sharing` |
 //! | `study` | many runs without a screen | `clock`, `plant`, `learner`, `sharing`, `teaching`, `session`, `operator`, `task`, `backend`, `record`, `profile`, `control`, `report` |
 //! | `tui` | screens that draw plain data | `control::snapshot`, `control::recording`, `report`, `record`, `profile`, `session`, `task`, `operator`, `backend`, `sharing`, `learner`, `clock`, `host` |
 //! | `cli` | the words of the command line | `learner`, `sharing`, `session`, `operator`, `backend`, `record`, `profile`, `study` |

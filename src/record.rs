@@ -21,6 +21,7 @@ mod names;
 pub mod policy;
 pub mod reader;
 pub mod sidecar;
+pub mod skim;
 mod steps;
 mod table;
 pub mod writer;

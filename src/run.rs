@@ -15,7 +15,9 @@ pub mod outcome;
 mod pad_relay;
 mod panics;
 mod plant;
+mod progress;
 mod replay;
+mod report;
 mod screen;
 pub mod session;
 mod shutdown;
@@ -94,6 +96,7 @@ fn obey(cli: &Cli) -> Result<ExitCode, RunError> {
             Err(RunError::Usage("this system has no Unix sockets to watch through".to_owned()))
         }
         Some(Command::Export(words)) => export::export(words),
+        Some(Command::Report(words)) => report::report(words),
         Some(Command::Simulate(simulate)) => words::simulate(simulate),
         Some(Command::PadRelay(words)) => pad_relay::pad_relay(words),
         #[cfg(unix)]

@@ -19,6 +19,7 @@ pub mod palette;
 pub mod pen;
 pub mod plant;
 pub mod replay;
+pub mod report;
 pub mod results;
 pub mod scene;
 pub mod sensitivity;

@@ -203,11 +203,12 @@ fn files_are_short_and_none_is_called_mod() {
 }
 
 /// Words that only some places may use.
-const RESERVED: [(&str, &[&str]); 7] = [
+const RESERVED: [(&str, &[&str]); 8] = [
     ("ratatui::", &["tui"]),
     ("crossterm::", &["tui", "operator/terminal"]),
     ("gilrs::", &["operator/gamepad"]),
-    ("indicatif::", &["run/fit/progress", "run/study/progress"]),
+    ("indicatif::", &["run/fit/progress", "run/progress", "run/study/progress"]),
+    ("kuva::", &["report/draw"]),
     ("serialport::", &["backend/serial", "backend/emulator"]),
     ("Instant::now", &["clock"]),
     ("SystemTime::now", &["clock"]),

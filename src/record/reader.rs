@@ -191,6 +191,16 @@ pub fn read_evaluation(path: &Path) -> Result<Vec<EvaluationRow>, Error> {
     Ok(rows)
 }
 
+/// Whether the table at `path` ends in the middle of a row.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn ends_in_half_a_row(path: &Path) -> Result<bool, Error> {
+    let whole = table::open_whole(path)?.limit();
+    let length = std::fs::metadata(path).map_err(Error::io("read", path))?.len();
+    Ok(whole < length)
+}
+
 /// The whole lines of a table.
 struct Lines {
     path: PathBuf,

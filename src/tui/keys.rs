@@ -23,11 +23,13 @@ pub enum Screen {
     Replay,
     /// A session at another terminal.
     Watch,
+    /// Figures and tables of sessions.
+    Report,
 }
 
 impl Screen {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Setup,
         Self::Briefing,
         Self::Live,
@@ -36,6 +38,7 @@ impl Screen {
         Self::Plant,
         Self::Replay,
         Self::Watch,
+        Self::Report,
     ];
 
     /// The heading in the help.
@@ -50,6 +53,7 @@ impl Screen {
             Self::Plant => "plant",
             Self::Replay => "replay",
             Self::Watch => "watch",
+            Self::Report => "report",
         }
     }
 }
@@ -61,6 +65,10 @@ pub enum Action {
     Next,
     /// To the one before.
     Previous,
+    /// To the next part of a report,
+    NextPart,
+    /// or to the one before.
+    PreviousPart,
     /// The value to the left; less.
     Left,
     /// The value to the right; more.
@@ -195,7 +203,7 @@ pub const BINDINGS: &[Binding] = {
         BackTab, Backspace, Char, Down, End, Enter, Esc, F, Home, Left, PageDown, PageUp,
     };
     use KeyCode::{Right, Tab, Up};
-    use Screen::{Briefing, Devices, Live, Plant, Replay, Results, Setup, Watch};
+    use Screen::{Briefing, Devices, Live, Plant, Replay, Report, Results, Setup, Watch};
     &[
         bind(Setup, &[Tab, Down], "Tab ↓", "next", "to the next field", A::Next),
         bind(Setup, &[BackTab, Up], "Shift-Tab ↑", "", "to the field before", A::Previous),
@@ -337,6 +345,30 @@ pub const BINDINGS: &[Binding] = {
         bind(Watch, &[Char('p')], "p", "progress", "show or hide share and success", A::Progress),
         bind(Watch, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
         bind(Watch, &[Char('q'), Esc], "q", "quit", "quit; the session goes on", A::Quit),
+        //
+        bind(
+            Report,
+            &[Right, Tab, Char('l')],
+            "←→",
+            "turn",
+            "the next page; ← the one before",
+            A::Next,
+        ),
+        bind(Report, &[Left, BackTab, Char('h')], "", "", "the page before", A::Previous),
+        bind(Report, &[Down], "↓↑", "scroll", "more of a long page; ↑ back", A::Down),
+        bind(Report, &[Up], "", "", "back up", A::Up),
+        bind(
+            Report,
+            &[Char('n')],
+            "n",
+            "next part",
+            "the next group, study or session",
+            A::NextPart,
+        ),
+        bind(Report, &[Char('p')], "p", "", "the one before", A::PreviousPart),
+        bind(Report, &[Char('s')], "s", "save", "save this figure here, as SVG and CSV", A::Save),
+        bind(Report, &[Char('?'), F(1)], "?", "keys", "show or hide these keys", A::Help),
+        bind(Report, &[Char('q'), Esc], "q", "quit", "quit", A::Quit),
     ]
 };
 
@@ -365,6 +397,8 @@ pub fn action(screen: Screen, event: KeyEvent) -> Option<Action> {
         found,
         Action::Next
             | Action::Previous
+            | Action::NextPart
+            | Action::PreviousPart
             | Action::Left
             | Action::Right
             | Action::Up

@@ -1,0 +1,469 @@
+//! The figures and tables of a group of subjects: figures 10 and 31–38, tables 1 and 2, and the
+//! comparison of both modes.
+//!
+//! A subject counts once: with several sessions in one mode, its numbers are their means.
+
+mod compared;
+mod tables;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::achieved::{Achieved, yardstick};
+use super::figure::{Axis, Caption, Content, Figure, Item, Mark, Role, Section, Series, real};
+use super::gather::Recorded;
+use super::metrics::{deviation, mean};
+use super::series::{WINDOW, moving_average, over_rows};
+use super::session::{line, measure, measured, numbered, role, with_unit};
+use super::words;
+use crate::record::EpisodeRow;
+use crate::session::Phase;
+use crate::sharing::Mode;
+use crate::task::balance::Balance;
+use crate::task::swing_up::SwingUp;
+
+/// Sessions that may be compared: of one task, preset and profile, kind of operator and plant.
+#[derive(Clone, Debug)]
+pub struct Group<'a> {
+    /// The task.
+    pub task: &'a str,
+    /// Task and preset, and what else tells the group from others.
+    pub preset: String,
+    /// The beginning of its files' names.
+    pub stem: String,
+    /// Its complete sessions.
+    pub sessions: Vec<&'a Recorded>,
+    /// Sessions that are not complete.
+    pub cut: Vec<&'a Recorded>,
+}
+
+/// A subject, and its means by percent of main.
+type Tenths<'a> = (&'a str, BTreeMap<u8, f64>);
+
+/// A subject in one mode.
+#[derive(Clone, Debug)]
+struct Subject<'a> {
+    name: &'a str,
+    sessions: Vec<&'a Recorded>,
+}
+
+impl Subject<'_> {
+    /// The mean over its sessions of a number that each has.
+    fn mean_of(&self, of: impl Fn(&Recorded) -> Option<f64>) -> Option<f64> {
+        let values: Vec<f64> = self.sessions.iter().filter_map(|session| of(session)).collect();
+        (!values.is_empty()).then(|| mean(&values))
+    }
+
+    /// The mean over its sessions of a list that each has, place by place.
+    fn mean_row(&self, of: impl Fn(&Recorded) -> Vec<f64>) -> Vec<f64> {
+        let rows: Vec<Vec<f64>> = self.sessions.iter().map(|session| of(session)).collect();
+        over_rows(&rows).into_iter().map(|(_, mean, ..)| mean).collect()
+    }
+}
+
+/// What a session's rollouts of `phase` are measured by, on average.
+fn average(session: &Recorded, phase: Phase) -> Option<f64> {
+    let rows = session.of_phase(phase);
+    if rows.is_empty() { None } else { Achieved::of(&session.task, &rows).mean() }
+}
+
+/// What each rollout of main is measured by.
+fn curve(session: &Recorded) -> Vec<f64> {
+    measured(&session.task, &session.of_phase(Phase::Main))
+}
+
+/// What the policy of each tenth is measured by alone: percent and mean.
+fn tenths(session: &Recorded) -> BTreeMap<u8, f64> {
+    let mut rows: BTreeMap<u8, Vec<&EpisodeRow>> = BTreeMap::new();
+    for (percent, row) in &session.tenths {
+        rows.entry(*percent).or_default().push(row);
+    }
+    let mean_of = |(percent, rows): (u8, Vec<&EpisodeRow>)| {
+        Some((percent, Achieved::of(&session.task, &rows).mean()?))
+    };
+    rows.into_iter().filter_map(mean_of).collect()
+}
+
+/// The part of a report that shows `group`.
+#[must_use]
+pub fn section(group: &Group<'_>) -> Section {
+    let mut items = Vec::new();
+    let comparison = compared::table(group);
+    items.extend(comparison.table.map(Item::Table));
+    if group.task == SwingUp::NAME {
+        items.extend(tables::regions(group).map(Item::Table));
+        items.extend(tables::swing_up(group).map(Item::Table));
+    }
+    items.extend(tables::subjects(group).map(Item::Table));
+    // Of one subject in one mode its own figures tell all but these.
+    let is_alone = matches!(&group.arms()[..], [(_, arm)] if arm.len() == 1);
+    let of_many = || {
+        [
+            group.balance_time(),
+            group.moving_averages(),
+            group.at_ends(Mode::Simultaneous, "success", 33, |row| row.success),
+            group.at_ends(Mode::Sequential, "success", 33, |row| row.success),
+            group.at_ends(Mode::Simultaneous, "share", 34, |row| row.share),
+            group.autonomous(),
+            group.sorted(),
+        ]
+    };
+    let figures = (!is_alone).then(of_many).into_iter().flatten();
+    let figures = figures.chain([group.each_tenth(), group.improvement()]).flatten();
+    items.extend(figures.map(Item::Figure));
+    let mut notes = group.notes();
+    notes.extend(comparison.sentences);
+    Section { title: format!("Group: {}", group.preset), notes, items }
+}
+
+impl<'a> Group<'a> {
+    /// The subjects who took part in `mode`, by name.
+    fn arm(&self, mode: Mode) -> Vec<Subject<'a>> {
+        let mut subjects: BTreeMap<&str, Vec<&Recorded>> = BTreeMap::new();
+        for session in self.sessions.iter().filter(|session| session.mode == mode) {
+            subjects.entry(&session.subject).or_default().push(session);
+        }
+        subjects.into_iter().map(|(name, sessions)| Subject { name, sessions }).collect()
+    }
+
+    /// Both modes that somebody took part in.
+    fn arms(&self) -> Vec<(Mode, Vec<Subject<'a>>)> {
+        let modes = [Mode::Sequential, Mode::Simultaneous].into_iter();
+        modes.map(|mode| (mode, self.arm(mode))).filter(|(_, arm)| !arm.is_empty()).collect()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let arms: Vec<String> = self
+            .arms()
+            .iter()
+            .map(|(mode, arm)| {
+                format!("{} in {} mode", words::counted(arm.len(), "subject"), mode.word())
+            })
+            .collect();
+        let repeated = self.arms().iter().any(|(_, arm)| arm.iter().any(|s| s.sessions.len() > 1));
+        let mut notes = vec![format!(
+            "{}. A subject counts once{}; rollouts of one subject are not independent.",
+            if arms.is_empty() { "No complete session".to_owned() } else { arms.join(", ") },
+            if repeated { ", with the mean of its sessions in a mode" } else { "" }
+        )];
+        if !self.cut.is_empty() {
+            let names: Vec<String> = self
+                .cut
+                .iter()
+                .map(|session| format!("{} ({})", session.title(), session.mode.word()))
+                .collect();
+            notes.push(format!("Not complete, so not counted here: {}.", names.join(", ")));
+        }
+        notes
+    }
+
+    fn caption(&self, name: &str, number: u32, title: &str, sentence: String) -> Caption {
+        let like = if self.task == Balance::NAME { "" } else { "like " };
+        Caption {
+            name: format!("{}-{name}", self.stem),
+            thesis: format!("{like}figure {number}"),
+            title: title.to_owned(),
+            preset: self.preset.clone(),
+            sentence,
+        }
+    }
+
+    fn balance_time(&self) -> Option<Figure> {
+        let axis = measure(self.task);
+        let mut series = Vec::new();
+        for (mode, arm) in self.arms() {
+            let curves: Vec<Vec<f64>> = arm.iter().map(|one| one.mean_row(curve)).collect();
+            let rows = over_rows(&curves);
+            let points = rows.iter().map(|row| (real(row.0), row.1)).collect();
+            let band = rows.iter().map(|row| (row.1 - row.2, row.1 + row.2)).collect();
+            series.push(Series::new(mode.word(), role(mode), line(mode), points).within(band));
+        }
+        let sentence = format!(
+            "The {} over the subjects of each group in each rollout of main, ± one standard \
+             deviation over subjects ({}).",
+            words::mean_of(&axis.label),
+            self.sizes()
+        );
+        let title = format!("{} of each group", words::heading(&axis.label));
+        series.iter().any(|one| !one.points.is_empty()).then(|| Figure {
+            caption: self.caption("per-rollout", 31, &title, sentence),
+            x: Axis::new("rollout", ""),
+            y: axis.clone(),
+            content: Content::Series(series),
+        })
+    }
+
+    fn moving_averages(&self) -> Option<Figure> {
+        let axis = measure(self.task);
+        let mut series = Vec::new();
+        for (mode, arm) in self.arms() {
+            let curves: Vec<Vec<f64>> = arm.iter().map(|one| one.mean_row(curve)).collect();
+            let means: Vec<f64> = over_rows(&curves).into_iter().map(|row| row.1).collect();
+            let averages = moving_average(&means, WINDOW);
+            let points = averages.into_iter().map(|(at, value)| (real(at), value)).collect();
+            series.push(Series::new(mode.word(), role(mode), line(mode), points));
+        }
+        series.retain(|one| !one.points.is_empty());
+        let sentence = format!(
+            "The moving average (window {WINDOW}) of the {} of each group ({}).",
+            words::mean_of(&axis.label),
+            self.sizes()
+        );
+        let title = format!("{} of each group, moving average", words::heading(&axis.label));
+        (!series.is_empty()).then(|| Figure {
+            caption: self.caption("moving-average", 32, &title, sentence),
+            x: Axis::new("rollout", ""),
+            y: axis,
+            content: Content::Series(series),
+        })
+    }
+
+    fn sizes(&self) -> String {
+        let arms = self.arms();
+        let sizes: Vec<String> =
+            arms.iter().map(|(mode, arm)| format!("{} {}", arm.len(), mode.word())).collect();
+        sizes.join(", ")
+    }
+
+    /// A number of each subject of `mode` at each rollout's end, in percent.
+    fn at_ends(
+        &self,
+        mode: Mode,
+        what: &str,
+        number: u32,
+        of: impl Fn(&EpisodeRow) -> Option<f64>,
+    ) -> Option<Figure> {
+        let arm = self.arm(mode);
+        let mut series = Vec::new();
+        for (at, subject) in arm.iter().enumerate() {
+            // All rollouts, so that places are rollouts: what is not known yet is a break.
+            let row = subject.mean_row(|session| {
+                let rows = session.of_phase(Phase::Main);
+                rows.iter().map(|row| of(row).map_or(f64::NAN, |value| 100.0 * value)).collect()
+            });
+            let points = row.iter().enumerate().map(|(n, value)| (real(n + 1), *value)).collect();
+            let mark = match at % 3 {
+                0 => Mark::Line,
+                1 => Mark::Dashed,
+                _ => Mark::Dotted,
+            };
+            let one = Series::new(subject.name, Role::One(at), mark, points);
+            series.extend(one.pieces().next().is_some().then(|| one.clone()));
+        }
+        let (title, label) = match what {
+            "share" => ("The person's share w of each subject", "person's share w"),
+            _ => ("Success of each subject", "success"),
+        };
+        let like = if mode == Mode::Sequential { "like " } else { "" };
+        let mut caption = self.caption(
+            &format!("{what}-{}", mode.word()),
+            number,
+            &format!("{title}, {} group", mode.word()),
+            format!(
+                "The {label} at the end of each rollout of main, of each of {} of the {} group.",
+                words::counted(arm.len(), "subject"),
+                mode.word()
+            ),
+        );
+        if !caption.thesis.starts_with("like ") {
+            caption.thesis.insert_str(0, like);
+        }
+        (!series.is_empty()).then(|| Figure {
+            caption,
+            x: Axis::new("rollout", ""),
+            y: Axis::new(label, "%").from(0.0, 100.0),
+            content: Content::Series(series),
+        })
+    }
+
+    /// The subjects' means of what their robots do alone, by mode.
+    fn alone(&self) -> Vec<(Mode, Vec<(&'a str, f64)>)> {
+        let arms = self.arms().into_iter().map(|(mode, arm)| {
+            let known = arm.iter().filter_map(|subject| {
+                let alone = subject.mean_of(|session| average(session, Phase::Autonomous))?;
+                Some((subject.name, alone))
+            });
+            (mode, known.collect::<Vec<_>>())
+        });
+        arms.filter(|(_, known)| !known.is_empty()).collect()
+    }
+
+    fn autonomous(&self) -> Option<Figure> {
+        let axis = measure(self.task);
+        let (mut series, mut names, mut told) = (Vec::new(), Vec::new(), Vec::new());
+        for (at, (mode, subjects)) in self.alone().into_iter().enumerate() {
+            let place = real(at + 1);
+            let values: Vec<f64> = subjects.iter().map(|(_, value)| *value).collect();
+            let (mean, sd) = (mean(&values), deviation(&values));
+            let spread = sd.unwrap_or(0.0);
+            series.push(
+                Series::new(
+                    format!("{}, mean ± sd", mode.word()),
+                    role(mode),
+                    Mark::Shape(at),
+                    vec![(place, mean)],
+                )
+                .within(vec![(mean - spread, mean + spread)]),
+            );
+            let beside = values.iter().map(|value| (place + 0.25, *value)).collect();
+            let label = format!("{}, each subject", mode.word());
+            series.push(Series::new(label, role(mode), Mark::Shape(at + 3), beside));
+            names.push((place, mode.word().to_owned()));
+            let sd = sd.map_or(String::new(), |sd| format!(" ± {}", with_unit(self.task, sd)));
+            let n = words::counted(values.len(), "subject");
+            told.push(format!("{} {}{sd} ({n})", mode.word(), with_unit(self.task, mean)));
+        }
+        let most = real(names.len()) + 0.5;
+        let sentence = format!(
+            "The {} of the final policies alone, ± one standard deviation over subjects: {}.",
+            words::mean_of(&axis.label),
+            told.join("; ")
+        );
+        let title = format!("{} of the robot alone, each group", words::heading(&axis.label));
+        (!series.is_empty()).then(|| Figure {
+            caption: self.caption("autonomous", 35, &title, sentence),
+            x: Axis { names, ..Axis::new("group", "").from(0.5, most) },
+            y: Axis { range: None, ..axis },
+            content: Content::Series(series),
+        })
+    }
+
+    /// The subjects of each group by what their robots do alone; for swing-up figure 10.
+    fn sorted(&self) -> Option<Figure> {
+        let axis = measure(self.task);
+        let better_is_more = yardstick(self.task).more_is_better;
+        let mut series = Vec::new();
+        let mut longest = 0;
+        for (at, (mode, subjects)) in self.alone().into_iter().enumerate() {
+            let mut values: Vec<f64> = subjects.iter().map(|(_, value)| *value).collect();
+            values.sort_by(f64::total_cmp);
+            if !better_is_more {
+                values.reverse();
+            }
+            longest = longest.max(values.len());
+            series.push(Series::new(mode.word(), role(mode), Mark::Linked(at), numbered(&values)));
+        }
+        let zero: Vec<f64> = self
+            .sessions
+            .iter()
+            .filter_map(|session| average(session, Phase::ZeroControl))
+            .collect();
+        if !zero.is_empty() {
+            let ends = vec![(1.0, mean(&zero)), (real(longest.max(2)), mean(&zero))];
+            series.push(Series::new("zero control", Role::Plain, Mark::Dashed, ends));
+        }
+        let number = if self.task == SwingUp::NAME { 10 } else { 36 };
+        let sentence = format!(
+            "The {} of each subject's final policy alone, the subjects of each group sorted \
+             from the worst to the best; the dashed line is what nobody at the controls comes to.",
+            words::mean_of(&axis.label)
+        );
+        let title = format!("{} of the robot alone, subjects sorted", words::heading(&axis.label));
+        let mut caption = self.caption("sorted", number, &title, sentence);
+        if number == 10 {
+            "figure 10".clone_into(&mut caption.thesis);
+        }
+        (longest > 0).then(|| Figure {
+            caption,
+            x: Axis {
+                names: (1..=longest).map(|n| (real(n), n.to_string())).collect(),
+                ..Axis::new("subject, from worst to best", "")
+            },
+            y: Axis { range: None, ..axis },
+            content: Content::Series(series),
+        })
+    }
+
+    /// Each subject's means after each tenth, by mode.
+    fn after_tenths(&self) -> Vec<(Mode, Vec<Tenths<'a>>)> {
+        let arms = self.arms().into_iter().map(|(mode, arm)| {
+            let known = arm.iter().map(|subject| {
+                let each: Vec<BTreeMap<u8, f64>> =
+                    subject.sessions.iter().map(|session| tenths(session)).collect();
+                let percents: BTreeSet<u8> =
+                    each.iter().flat_map(BTreeMap::keys).copied().collect();
+                let at = |percent: u8| {
+                    let values: Vec<f64> =
+                        each.iter().filter_map(|one| one.get(&percent)).copied().collect();
+                    (percent, mean(&values))
+                };
+                (subject.name, percents.into_iter().map(at).collect::<BTreeMap<_, _>>())
+            });
+            (mode, known.filter(|(_, tenths)| !tenths.is_empty()).collect::<Vec<_>>())
+        });
+        arms.filter(|(_, known)| !known.is_empty()).collect()
+    }
+
+    fn each_tenth(&self) -> Option<Figure> {
+        let axis = measure(self.task);
+        let mut series = Vec::new();
+        for (mode, subjects) in self.after_tenths() {
+            for (at, (name, tenths)) in subjects.into_iter().enumerate() {
+                let points = tenths.into_iter().map(|(percent, v)| (f64::from(percent), v));
+                let label = format!("{name} ({})", mode.word());
+                let role = role(mode);
+                series.push(Series::new(label, role, Mark::Linked(at), points.collect()));
+            }
+        }
+        let sentence = format!(
+            "The {} of each subject's robot alone after each tenth of main; colours tell the \
+             groups apart, shapes the subjects.",
+            words::mean_of(&axis.label)
+        );
+        let title = format!("{} of the robot alone after each tenth", words::heading(&axis.label));
+        (!series.is_empty()).then(|| Figure {
+            caption: self.caption("tenths", 37, &title, sentence),
+            x: Axis::new("part of main", "%").from(0.0, 100.0),
+            y: Axis { range: None, ..axis },
+            content: Content::Series(series),
+        })
+    }
+
+    fn improvement(&self) -> Option<Figure> {
+        let axis = measure(self.task);
+        // A ratio says nothing of heights, which may be negative, nor of steps that shall be few.
+        let by_ratio = axis.range.is_none() && yardstick(self.task).more_is_better;
+        let sign = if yardstick(self.task).more_is_better { 1.0 } else { -1.0 };
+        let (mut series, mut told) = (Vec::new(), Vec::new());
+        for (mode, subjects) in self.after_tenths() {
+            let percents: BTreeSet<u8> =
+                subjects.iter().flat_map(|(_, t)| t.keys()).copied().collect();
+            let means: Vec<(f64, f64)> = percents
+                .into_iter()
+                .map(|percent| {
+                    let values: Vec<f64> =
+                        subjects.iter().filter_map(|(_, t)| t.get(&percent)).copied().collect();
+                    (f64::from(percent), mean(&values))
+                })
+                .collect();
+            let first = means.first()?.1;
+            let better = |value: f64| {
+                if by_ratio { 100.0 * (value / first - 1.0) } else { sign * (value - first) }
+            };
+            let points: Vec<(f64, f64)> = means.iter().map(|(x, y)| (*x, better(*y))).collect();
+            if let Some((_, last)) = points.last() {
+                let last =
+                    if by_ratio { format!("{last:.0} %") } else { with_unit(self.task, *last) };
+                told.push(format!("{} {last}", mode.word()));
+            }
+            let at = usize::from(mode == Mode::Sequential);
+            series.push(Series::new(mode.word(), role(mode), Mark::Linked(at), points));
+        }
+        let sentence = format!(
+            "How much better the mean of each group's robots alone is than after the first tenth \
+             of main; at the end {}.",
+            told.join(", ")
+        );
+        let title = "Improvement of the robot alone over the first tenth";
+        let y = if by_ratio {
+            Axis::new("improvement", "%")
+        } else {
+            Axis::new(format!("improvement of {}", axis.label), axis.unit)
+        };
+        (!series.is_empty()).then(|| Figure {
+            caption: self.caption("improvement", 38, title, sentence),
+            x: Axis::new("part of main", "%").from(0.0, 100.0),
+            y,
+            content: Content::Series(series),
+        })
+    }
+}

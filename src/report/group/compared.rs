@@ -1,0 +1,212 @@
+//! Both modes beside each other, with the tests that a reviewer asks for.
+
+use std::collections::BTreeMap;
+
+use super::{Group, Subject, average, curve};
+use crate::report::achieved::yardstick;
+use crate::report::figure::{Caption, Table};
+use crate::report::gather::Recorded;
+use crate::report::metrics::{deviation, mean};
+use crate::report::series::WINDOW;
+use crate::report::session::with_unit;
+use crate::report::spread::median;
+use crate::report::statistics::{Comparison, Test, compare, compare_paired};
+use crate::report::words;
+use crate::session::Phase;
+use crate::sharing::Mode;
+
+/// The seed of the intervals' resampling: the same report each time.
+const SEED: u64 = 0;
+
+/// The comparison of a group's modes.
+pub(super) struct Compared {
+    /// Its table, where both modes took place.
+    pub(super) table: Option<Table>,
+    /// In sentences.
+    pub(super) sentences: Vec<String>,
+}
+
+/// What is compared: its name, and the number of a session.
+type Measure = (String, fn(&Recorded) -> Option<f64>);
+
+fn measures(task: &str) -> [Measure; 3] {
+    let name = yardstick(task).name;
+    [
+        (format!("{name}, robot alone"), |session| average(session, Phase::Autonomous)),
+        (format!("{name}, teaching"), |session| average(session, Phase::Main)),
+        (format!("{name}, last {WINDOW} rollouts"), |session| {
+            let values = curve(session);
+            let last = &values[values.len().saturating_sub(WINDOW)..];
+            (!last.is_empty()).then(|| mean(last))
+        }),
+    ]
+}
+
+/// How subjects of both modes belong together.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Pairing {
+    /// They do not.
+    None,
+    /// They are the same people.
+    Subjects,
+    /// They are simulated, with the same seeds.
+    Seeds,
+}
+
+impl Pairing {
+    fn of(arms: &[Vec<Subject<'_>>; 2], is_simulated: bool) -> Self {
+        let names = arms.each_ref().map(|arm| arm.iter().map(|one| one.name).collect::<Vec<_>>());
+        let seeds = arms.each_ref().map(|arm| {
+            let mut seeds: Vec<u64> = arm.iter().filter_map(single_seed).collect();
+            seeds.sort_unstable();
+            seeds.dedup();
+            seeds
+        });
+        if names[0] == names[1] {
+            Self::Subjects
+        } else if is_simulated && seeds[0] == seeds[1] && seeds[0].len() == names[0].len() {
+            Self::Seeds
+        } else {
+            Self::None
+        }
+    }
+
+    /// The values of both modes, paired ones in the same order.
+    fn values(
+        self,
+        arms: &[Vec<Subject<'_>>; 2],
+        of: impl Fn(&Subject<'_>) -> Option<f64>,
+    ) -> [Vec<f64>; 2] {
+        if self == Self::None {
+            return arms.each_ref().map(|arm| arm.iter().filter_map(&of).collect());
+        }
+        let key = |subject: &Subject<'_>| match self {
+            Self::Seeds => single_seed(subject).map(|seed| format!("{seed:020}")),
+            _ => Some(subject.name.to_owned()),
+        };
+        let [first, second] = arms.each_ref().map(|arm| {
+            let known = arm.iter().filter_map(|subject| Some((key(subject)?, of(subject)?)));
+            known.collect::<BTreeMap<_, _>>()
+        });
+        let both = first.iter().filter_map(|(key, a)| Some((*a, *second.get(key)?)));
+        let (a, b): (Vec<f64>, Vec<f64>) = both.unzip();
+        [a, b]
+    }
+}
+
+/// The seed of a subject with one session.
+fn single_seed(subject: &Subject<'_>) -> Option<u64> {
+    match subject.sessions[..] {
+        [session] => Some(session.seed),
+        _ => None,
+    }
+}
+
+/// Compares the modes of `group`.
+pub(super) fn table(group: &Group<'_>) -> Compared {
+    let arms = [group.arm(Mode::Simultaneous), group.arm(Mode::Sequential)];
+    if arms.iter().any(Vec::is_empty) {
+        return Compared { table: None, sentences: Vec::new() };
+    }
+    let is_simulated =
+        group.sessions.iter().all(|session| session.operator.starts_with("simulated"));
+    let pairing = Pairing::of(&arms, is_simulated);
+    let (mut rows, mut sentences) = (Vec::new(), Vec::new());
+    for (name, of) in measures(group.task) {
+        let [a, b] = pairing.values(&arms, |subject| subject.mean_of(of));
+        let compared = match pairing {
+            Pairing::None => compare(&a, &b, SEED),
+            _ => compare_paired(&a, &b, SEED),
+        };
+        if let Some(compared) = &compared {
+            sentences.push(format!(
+                "{}, simultaneous against sequential: {compared}.",
+                words::heading(&name)
+            ));
+        }
+        if !a.is_empty() || !b.is_empty() {
+            rows.push(row(group.task, name, [&a, &b], compared.as_ref()));
+        }
+    }
+    if sentences.is_empty() {
+        let few = "Too few subjects for a test: it takes at least two in each mode.";
+        sentences.push(few.to_owned());
+    }
+    let (few, paired) = match pairing {
+        Pairing::None => ("subjects are dealt to the modes", ""),
+        Pairing::Subjects => ("differences of subjects change their sign", ", paired by subject"),
+        Pairing::Seeds => ("differences of seeds change their sign", ", paired by seed"),
+    };
+    let sentence = format!(
+        "Simultaneous against sequential mode{paired}: means ± standard deviation over subjects, \
+         medians, the difference of means with its 95 % interval (BCa bootstrap), Hedges' g, and \
+         the chance p of such a difference if the mode did not matter. With few subjects p counts \
+         every way in which {few}; none of the rows is corrected for the others."
+    );
+    let table = Table {
+        caption: Caption {
+            name: format!("{}-comparison", group.stem),
+            thesis: String::new(),
+            title: "Simultaneous against sequential".to_owned(),
+            preset: group.preset.clone(),
+            sentence,
+        },
+        columns: [
+            "measure",
+            "simultaneous",
+            "sequential",
+            "difference",
+            "95 % interval",
+            "Hedges' g",
+            "test",
+            "p",
+            "smallest p possible",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+        rows,
+    };
+    Compared { table: Some(table), sentences }
+}
+
+fn row(
+    task: &str,
+    name: String,
+    values: [&[f64]; 2],
+    compared: Option<&Comparison>,
+) -> Vec<String> {
+    let decimals = yardstick(task).decimals.max(2);
+    let arm = |values: &[f64]| {
+        let sd = deviation(values).map_or(String::new(), |sd| format!(" ± {sd:.decimals$}"));
+        let middle = median(values).map_or(String::new(), |m| format!(", median {m:.decimals$}"));
+        format!("{}{sd}{middle} (n = {})", with_unit(task, mean(values)), values.len())
+    };
+    let nothing = "–".to_owned();
+    let mut row = vec![name, arm(values[0]), arm(values[1])];
+    row.extend(match compared {
+        None => vec![nothing; 6],
+        Some(compared) => vec![
+            format!("{:+.decimals$}", compared.difference),
+            compared.interval95.map_or_else(
+                || nothing.clone(),
+                |(a, b)| format!("{a:+.decimals$} to {b:+.decimals$}"),
+            ),
+            compared.hedges_g.map_or_else(|| nothing.clone(), |g| format!("{g:+.2}")),
+            test(compared.test),
+            format!("{:.3}", compared.p),
+            compared.smallest_p.map_or(nothing, |p| format!("{p:.3}")),
+        ],
+    });
+    row
+}
+
+fn test(test: Test) -> String {
+    match test {
+        Test::Permutation { arrangements } => format!("exact permutation, {arrangements} ways"),
+        Test::PairedPermutation { arrangements } => {
+            format!("exact sign flips, {arrangements} ways")
+        }
+        Test::Welch { t, df } => format!("Welch t = {t:.2}, df = {df:.1}"),
+        Test::PairedT { t, df } => format!("paired t = {t:.2}, df = {df:.0}"),
+    }
+}

@@ -1,0 +1,214 @@
+//! `coadapt report`: what came out of sessions and studies, as a page, files, text or JSON.
+
+use std::fs;
+use std::io::{self, Write as _};
+use std::panic::{self, AssertUnwindSafe};
+use std::path::Path;
+use std::process::ExitCode;
+
+use serde::Serialize;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+use super::shutdown::Shutdown;
+use super::{RunError, panics, progress, say, signal_code, tell};
+use crate::cli;
+use crate::clock::WallClock;
+use crate::operator::terminal::Hands;
+use crate::record::VERSION;
+use crate::report::compose::compose;
+use crate::report::figure::{Item, Report};
+use crate::report::gather::{Gathered, find, gather};
+use crate::report::{draw, html, text};
+use crate::tui::app::End;
+use crate::tui::report::{Bench, Pages, show};
+use crate::tui::terminal::{Feed, KeysFrom, Screen, give_back};
+
+/// Of the JSON object.
+const SCHEMA: u32 = 1;
+
+/// `coadapt report …`
+pub(super) fn report(words: &cli::Report) -> Result<ExitCode, RunError> {
+    let gathered = read(words);
+    for left in &gathered.left_out {
+        tell(&format!("left out: {}: {}", left.path, left.why));
+    }
+    if gathered.sessions.is_empty() && gathered.studies.is_empty() {
+        let hint = "nothing to report: no session and no study can be used; name the folder of \
+                    one, or one above some, such as logs";
+        return Err(RunError::Usage(hint.to_owned()));
+    }
+    let report = compose(&gathered);
+    if let Some(folder) = &words.csv {
+        write_files(&report, folder)?;
+        let items = report.items().count();
+        tell(&format!("the data of {items} figures and tables are in {}", folder.display()));
+    }
+    if let Some(path) = &words.out {
+        write_whole(path, html::page(&report, VERSION).as_bytes())?;
+        tell(&format!("the report is in {}", path.display()));
+    }
+    if words.json {
+        say(&json(&report, &gathered)?)?;
+    } else if words.out.is_none() && words.csv.is_none() {
+        if Screen::check(KeysFrom::Input).is_ok() {
+            return on_screen(&report);
+        }
+        say(&text::lines(&report).join("\n"))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Does what the screen cannot.
+struct Desk {
+    shutdown: Shutdown,
+}
+
+impl Bench for Desk {
+    fn save(&mut self, item: &Item) -> String {
+        let (data, name) = (item.data_file(), &item.caption().name);
+        match (write_item(item, Path::new(".")), item) {
+            (Ok(()), Item::Figure(_)) => format!("saved {name}.svg and {data} here"),
+            (Ok(()), Item::Table(_)) => format!("saved {data} here"),
+            (Err(error), _) => error.to_string(),
+        }
+    }
+
+    fn is_told_to_end(&self) -> bool {
+        self.shutdown.signal().is_some()
+    }
+}
+
+/// Shows the report until the person leaves.
+fn on_screen(report: &Report) -> Result<ExitCode, RunError> {
+    let keyboard = crate::operator::terminal::Params::default();
+    let feed = Feed::new(Hands::new(&keyboard), WallClock::start());
+    let mut desk = Desk { shutdown: Shutdown::listen() };
+    let pages = Pages::new(report);
+    let mut screen =
+        Screen::take(feed, KeysFrom::Input).map_err(|error| RunError::Usage(error.to_string()))?;
+    let ended = panic::catch_unwind(AssertUnwindSafe(|| show(&mut screen, &mut desk, pages)));
+    // A terminal that is gone lets even its farewell fail.
+    let _ = panic::catch_unwind(AssertUnwindSafe(|| drop(screen)));
+    give_back();
+    panics::tell_last_words();
+    Ok(match ended {
+        Ok(End::Quit) => ExitCode::SUCCESS,
+        Ok(End::Interrupted) => signal_code(SIGINT),
+        Ok(End::Signal) => signal_code(desk.shutdown.signal().unwrap_or(SIGTERM)),
+        Ok(End::Lost) => signal_code(SIGHUP),
+        Err(_) => return Err(RunError::Failed("the screen failed".to_owned())),
+    })
+}
+
+fn read(words: &cli::Report) -> Gathered {
+    let found = find(&words.folders);
+    let bar = progress::bar(found.sessions.len(), "sessions");
+    let gathered = gather(found, &|| {
+        if let Some(bar) = &bar {
+            bar.inc(1);
+        }
+    });
+    if let Some(bar) = bar {
+        bar.finish_and_clear();
+    }
+    gathered
+}
+
+/// Writes the data of all figures and tables, and the figures themselves, into `folder`.
+fn write_files(report: &Report, folder: &Path) -> Result<(), RunError> {
+    fs::create_dir_all(folder).map_err(|error| failed("make the folder", folder, &error))?;
+    report.items().try_for_each(|item| write_item(item, folder))
+}
+
+/// Writes the data of `item`, and the figure itself, into `folder`.
+fn write_item(item: &Item, folder: &Path) -> Result<(), RunError> {
+    write_whole(&folder.join(item.data_file()), item.csv().as_bytes())?;
+    if let Item::Figure(figure) = item {
+        let path = folder.join(format!("{}.svg", figure.caption.name));
+        write_whole(&path, draw::alone(figure).as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Writes a file that is there whole or not at all.
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let write = || -> io::Result<()> {
+        let mut file = tempfile::NamedTempFile::new_in(folder)?;
+        file.write_all(bytes)?;
+        permit(file.as_file())?;
+        file.persist(path).map_err(|error| error.error)?;
+        Ok(())
+    };
+    write().map_err(|error| failed("write", path, &error))
+}
+
+/// A temporary file is for its owner only; a report is for whom the folder is.
+#[cfg(unix)]
+fn permit(file: &fs::File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt as _;
+    file.set_permissions(fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn permit(_: &fs::File) -> io::Result<()> {
+    Ok(())
+}
+
+fn failed(action: &str, path: &Path, error: &io::Error) -> RunError {
+    let hint = "choose a place that is there and that you may write to";
+    RunError::Failed(format!("cannot {action} {}: {error}; {hint}", path.display()))
+}
+
+/// The report as one JSON object.
+fn json(report: &Report, gathered: &Gathered) -> Result<String, RunError> {
+    #[derive(Serialize)]
+    struct Session<'a> {
+        path: String,
+        subject: &'a str,
+        trial: u32,
+        task: &'a str,
+        preset: &'a str,
+        mode: &'static str,
+        learner: &'a str,
+        operator: &'a str,
+        backend: &'a str,
+        seed: u64,
+        status: crate::record::Status,
+    }
+    #[derive(Serialize)]
+    struct Object<'a> {
+        schema: u32,
+        version: &'static str,
+        sessions: Vec<Session<'a>>,
+        studies: Vec<String>,
+        #[serde(flatten)]
+        report: &'a Report,
+    }
+    let sessions = gathered.sessions.iter().map(|session| Session {
+        path: session.path.display().to_string(),
+        subject: &session.subject,
+        trial: session.trial,
+        task: &session.task,
+        preset: &session.preset,
+        mode: session.mode.word(),
+        learner: &session.learner,
+        operator: &session.operator,
+        backend: &session.backend,
+        seed: session.seed,
+        status: session.status,
+    });
+    let studies = gathered.studies.iter().map(|study| study.path.display().to_string());
+    let object = Object {
+        schema: SCHEMA,
+        version: VERSION,
+        sessions: sessions.collect(),
+        studies: studies.collect(),
+        report,
+    };
+    serde_json::to_string(&object)
+        .map_err(|error| RunError::Failed(format!("the report has no JSON: {error}")))
+}

@@ -1,0 +1,233 @@
+//! A figure in the cells of a terminal.
+
+use ratatui::style::Style;
+use ratatui::symbols::Marker;
+use ratatui::text::Line;
+use ratatui::widgets::{Axis as ChartAxis, Chart, Dataset, GraphType, Widget};
+
+use super::heading;
+use crate::report::figure::{Axis, Cells, Content, Figure, Mark, Role as Meaning, Series};
+use crate::report::text::{short, span};
+use crate::tui::palette::{Glyphs, Role};
+use crate::tui::pen::{Pen, columns};
+use crate::tui::text::{cut, wrapped};
+
+/// Above so many points of a series its spread would hide all else.
+const MOST_BARS: usize = 12;
+/// Steps between the dots of a dotted line, parts of the chart's width.
+const DOTS: f64 = 60.0;
+
+/// Draws `figure` with heading, legend and sentence.
+pub(super) fn draw(pen: &mut Pen<'_>, figure: &Figure) {
+    let (width, height) = (pen.width(), pen.height());
+    pen.text(0, 0, &heading(&figure.caption), Role::Strong);
+    let axes = format!("   ↑ {}   → {}", figure.y.title(), figure.x.title());
+    let after = pen.text(0, 1, &figure.caption.preset, Role::Dim);
+    pen.text(after, 1, &axes, Role::Dim);
+    let sentence = wrapped(&figure.caption.sentence, usize::from(width));
+    let legend = match &figure.content {
+        Content::Series(series) => legend(pen, series),
+        Content::Cells(cells) => vec![vec![(scale(cells), Role::Text)]],
+    };
+    let words = u16::try_from(sentence.len() + legend.len()).unwrap_or(u16::MAX);
+    let top = 2;
+    let room = height.saturating_sub(top + words);
+    match &figure.content {
+        Content::Series(series) => lines(&mut pen.part(0, top, width, room), figure, series),
+        Content::Cells(cells) => plane(&mut pen.part(0, top, width, room), figure, cells),
+    }
+    let mut y = top + room;
+    for entries in legend {
+        let mut x = 0;
+        for (text, role) in entries {
+            x = pen.text(x, y, &text, role) + 3;
+        }
+        y += 1;
+    }
+    for line in sentence {
+        pen.text(0, y, &line, Role::Text);
+        y += 1;
+    }
+}
+
+/// What stands for a series: its colour and its sign.
+fn look_of(series: &Series, at: usize, glyphs: Glyphs) -> (Role, Marker, char) {
+    const SIGNS: [char; 6] = ['o', '^', 'x', '+', '*', '#'];
+    let role = match series.role {
+        Meaning::Simultaneous | Meaning::Machine => Role::Robot,
+        Meaning::Sequential | Meaning::Human => Role::You,
+        Meaning::Plain => Role::Text,
+        Meaning::One(at) => {
+            [Role::You, Role::Robot, Role::Go, Role::Countdown, Role::Wait, Role::Text][at % 6]
+        }
+    };
+    let line = if glyphs == Glyphs::Braille { Marker::Braille } else { Marker::Custom('.') };
+    match series.mark {
+        Mark::Line => (role, line, '─'),
+        Mark::Thin => (role, line, '·'),
+        Mark::Dashed => (role, Marker::Custom('-'), '-'),
+        Mark::Dotted => (role, Marker::Custom('\''), '\''),
+        Mark::Shape(shape) | Mark::Linked(shape) => {
+            let sign =
+                SIGNS[(shape + usize::from(matches!(series.role, Meaning::One(_))) * at) % 6];
+            (role, Marker::Custom(sign), sign)
+        }
+    }
+}
+
+/// The legend's entries, line by line.
+fn legend(pen: &Pen<'_>, series: &[Series]) -> Vec<Vec<(String, Role)>> {
+    let mut lines: Vec<Vec<(String, Role)>> = vec![Vec::new()];
+    let mut used = 0;
+    for (at, one) in series.iter().enumerate() {
+        let (role, _, sign) = look_of(one, at, pen.look.glyphs);
+        let entry = cut(&format!("{sign} {}", one.label), usize::from(pen.width()));
+        let length = columns(&entry) + 3;
+        if used > 0 && used + length > pen.width() {
+            lines.push(Vec::new());
+            used = 0;
+        }
+        used += length;
+        if let Some(line) = lines.last_mut() {
+            line.push((entry, role));
+        }
+    }
+    // More would leave no room for the picture.
+    lines.truncate(4);
+    lines
+}
+
+/// What is drawn with one sign.
+type Curve = (Role, Marker, GraphType, Vec<(f64, f64)>);
+
+fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
+    let all = || series.iter().flat_map(Series::pieces).flatten();
+    let x = bounds(&figure.x, all().map(|point| point.0));
+    let spreads = series.iter().filter_map(|one| one.spread.as_ref()).flatten();
+    let ys = all().map(|point| point.1).chain(spreads.flat_map(|(a, b)| [*a, *b]));
+    let (least, most) = bounds(&figure.y, ys);
+    let y = (figure.ground().unwrap_or(least), most);
+    let mut drawn: Vec<Curve> = Vec::new();
+    for (at, one) in series.iter().enumerate() {
+        let (role, marker, _) = look_of(one, at, pen.look.glyphs);
+        let is_line = matches!(one.mark, Mark::Line | Mark::Thin);
+        for piece in one.pieces() {
+            let (kind, points) = match one.mark {
+                _ if is_line => (GraphType::Line, piece.to_vec()),
+                Mark::Dashed | Mark::Dotted => (GraphType::Scatter, dotted(piece, x)),
+                _ => (GraphType::Scatter, piece.to_vec()),
+            };
+            drawn.push((role, marker, kind, points));
+        }
+        if let Some(spread) = &one.spread
+            && spread.len() == one.points.len()
+            && spread.len() <= MOST_BARS
+        {
+            let ends = one.points.iter().zip(spread);
+            let ends = ends.flat_map(|((x, _), (a, b))| [(*x, *a), (*x, *b)]).collect();
+            drawn.push((Role::Dim, Marker::Dot, GraphType::Scatter, ends));
+        }
+    }
+    let data = drawn.iter().map(|(role, marker, kind, points)| {
+        Dataset::default().marker(*marker).graph_type(*kind).style(pen.style(*role)).data(points)
+    });
+    let area = pen.area();
+    let chart = Chart::new(data.collect())
+        .x_axis(axis(pen, &figure.x, x))
+        .y_axis(axis(pen, &figure.y, y))
+        .legend_position(None);
+    chart.render(area, pen.buffer());
+}
+
+/// Points along `piece`, near enough to be taken for a line.
+fn dotted(piece: &[(f64, f64)], bounds: (f64, f64)) -> Vec<(f64, f64)> {
+    let apart = (bounds.1 - bounds.0) / DOTS;
+    let mut points = Vec::new();
+    for pair in piece.windows(2) {
+        let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
+        points.push((x0, y0));
+        let mut x = x0 + apart;
+        while x < x1 {
+            points.push((x, y0 + (y1 - y0) * (x - x0) / (x1 - x0)));
+            x += apart;
+        }
+    }
+    points.extend(piece.last());
+    points
+}
+
+/// What an axis shows: never nothing.
+fn bounds(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (least, most) = axis.range.unwrap_or_else(|| span(values));
+    if least < most { (least, most) } else { (least - 0.5, most + 0.5) }
+}
+
+fn axis<'a>(pen: &Pen<'_>, axis: &'a Axis, (least, most): (f64, f64)) -> ChartAxis<'a> {
+    let style: Style = pen.style(Role::Dim);
+    let labels: Vec<Line<'_>> = if axis.names.is_empty() {
+        [least, f64::midpoint(least, most), most].map(|value| Line::raw(short(value))).to_vec()
+    } else {
+        let names = axis.names.iter().map(|(_, name)| Line::raw(name.clone()));
+        // Labels stand evenly apart: where half a place is left at both ends, so are blanks.
+        if axis.range.is_some() {
+            let blank = || std::iter::once(Line::default());
+            blank().chain(names.flat_map(|name| [name, Line::default()])).collect()
+        } else {
+            names.collect()
+        }
+    };
+    ChartAxis::default().bounds([least, most]).labels(labels).style(style)
+}
+
+/// Signs for cells, from the least to the most.
+const SHADES: [char; 5] = [' ', '░', '▒', '▓', '█'];
+/// The same where 0 is the middle.
+const BELOW_AND_ABOVE: [char; 7] = ['≡', '=', '-', ' ', '░', '▒', '█'];
+
+fn shades(cells: &Cells) -> &'static [char] {
+    if cells.diverging { &BELOW_AND_ABOVE } else { &SHADES }
+}
+
+/// The least and the most of the cells; around 0 where that is the middle.
+fn range(cells: &Cells) -> (f64, f64) {
+    let (least, most) = span(cells.rows.iter().flatten().copied());
+    let largest = least.abs().max(most.abs());
+    if cells.diverging { (-largest, largest) } else { (least, most) }
+}
+
+fn scale(cells: &Cells) -> String {
+    let (least, most) = range(cells);
+    let shades: String = shades(cells).iter().collect();
+    format!("{}: {} [{shades}] {}", cells.label, short(least), short(most))
+}
+
+/// Each cell of the terminal shows the cell that lies at its place.
+fn plane(pen: &mut Pen<'_>, figure: &Figure, cells: &Cells) {
+    let (width, height) = (pen.width(), pen.height());
+    let (least, most) = range(cells);
+    let shades = shades(cells);
+    let rows = cells.rows.len();
+    let room = height.saturating_sub(2);
+    for y in 0..room {
+        let row = usize::from(room - 1 - y) * rows / usize::from(room.max(1));
+        let Some(values) = cells.rows.get(row) else { continue };
+        let line: String = (0..width)
+            .map(|x| {
+                let value = values[usize::from(x) * values.len() / usize::from(width.max(1))];
+                let part = (value - least) / (most - least).max(f64::MIN_POSITIVE);
+                let last = crate::report::figure::real(shades.len());
+                let level = (0..shades.len())
+                    .rev()
+                    .find(|at| part * last >= crate::report::figure::real(*at))
+                    .unwrap_or(0);
+                if value.is_finite() { shades[level] } else { ' ' }
+            })
+            .collect();
+        pen.text(0, y, &line, Role::Text);
+    }
+    let ends = |axis: &Axis| {
+        let (least, most) = axis.range.unwrap_or((0.0, 1.0));
+        format!("{} from {} to {}", axis.title(), short(least), short(most))
+    };
+    pen.text(0, room, &format!("→ {}   ↑ {}", ends(&figure.x), ends(&figure.y)), Role::Dim);
+}

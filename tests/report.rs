@@ -1,0 +1,274 @@
+//! Reports as a user makes them, of sessions that went well and of what else lies in folders.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking, helpers too")]
+
+#[path = "program/desk.rs"]
+mod desk;
+
+use std::fs;
+use std::path::Path;
+
+use desk::{Desk, names, text};
+use serde_json::Value;
+
+/// A short session of `subject`.
+fn session(desk: &Desk, profile: &str, subject: &str, mode: &str, seed: u32) {
+    desk.succeed(&format!(
+        "run {profile} --headless --operator simulated:naive --subject {subject} --mode {mode} \
+         --seed {seed} --rollouts 14 --set session.introduction_rollouts=1 --set \
+         session.autonomous_rollouts=12"
+    ));
+}
+
+/// Three subjects in each mode, and one of them in both.
+fn group(desk: &Desk) {
+    for (subject, mode, seed) in [
+        ("A1", "sequential", 1),
+        ("A2", "sequential", 2),
+        ("A3", "sequential", 3),
+        ("B1", "simultaneous", 4),
+        ("B2", "simultaneous", 5),
+        ("A1", "simultaneous", 6),
+    ] {
+        session(desk, "balance", subject, mode, seed);
+    }
+}
+
+fn json(desk: &Desk, line: &str) -> Value {
+    serde_json::from_str(&desk.succeed(line)).unwrap()
+}
+
+/// What the figures and tables of a report are in the thesis.
+fn thesis(report: &Value) -> Vec<String> {
+    let sections = report["sections"].as_array().unwrap();
+    let items = sections.iter().flat_map(|section| section["items"].as_array().unwrap());
+    items.map(|item| item["thesis"].as_str().unwrap().to_owned()).collect()
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
+    }
+}
+
+#[test]
+fn a_group_becomes_the_figures_of_the_thesis() {
+    let desk = Desk::new();
+    group(&desk);
+    let report = json(&desk, "report logs --json");
+    assert_eq!(report["schema"], 1);
+    assert_eq!(report["sessions"].as_array().unwrap().len(), 6);
+    assert_eq!(report["left_out"].as_array().unwrap().len(), 0);
+    let figures = thesis(&report);
+    for number in (14..=38).filter(|number| !(10..14).contains(number)) {
+        let name = format!("figure {number}");
+        assert!(figures.contains(&name), "{name}: {figures:?}");
+    }
+    // Every figure says what, of what, and where its data are.
+    for section in report["sections"].as_array().unwrap() {
+        for item in section["items"].as_array().unwrap() {
+            assert_eq!(item["preset"], "balance · thesis", "{item}");
+            assert!(item["sentence"].as_str().unwrap().ends_with('.'), "{item}");
+        }
+    }
+    let groups = report["sections"].as_array().unwrap().iter();
+    let titles: Vec<&str> = groups.map(|section| section["title"].as_str().unwrap()).collect();
+    assert_eq!(titles.iter().filter(|title| title.starts_with("Group")).count(), 1, "{titles:?}");
+}
+
+#[test]
+fn a_page_and_its_files_are_written_whole() {
+    let desk = Desk::new();
+    session(&desk, "balance", "S1", "simultaneous", 1);
+    let output = desk.run("report logs --out page.html --csv data");
+    assert!(output.status.success() && output.stdout.is_empty(), "{}", text(&output.stderr));
+    let page = fs::read_to_string(desk.at("page.html")).unwrap();
+    assert!(page.starts_with("<!DOCTYPE html>") && page.ends_with("</html>\n"));
+    assert!(page.len() < 3_000_000, "{}", page.len());
+    // Each figure names a data file that is there, and has a picture beside it.
+    let named: Vec<&str> = page
+        .split("Data: <code>")
+        .skip(1)
+        .map(|rest| rest.split("</code>").next().unwrap())
+        .collect();
+    assert!(named.len() > 10, "{named:?}");
+    for name in &named {
+        assert!(desk.at("data").join(name).is_file(), "{name}");
+    }
+    let csv =
+        fs::read_to_string(desk.at("data/S1-001-balance-simultaneous-per-rollout.csv")).unwrap();
+    assert!(csv.starts_with("series,rollout,balance_time_s,least,most\nsimultaneous,1,"), "{csv}");
+    assert_eq!(csv.lines().filter(|line| line.starts_with("simultaneous,")).count(), 14);
+    let svg = fs::read_to_string(desk.at("data/S1-001-balance-simultaneous-share.svg")).unwrap();
+    assert!(svg.starts_with("<svg") && !svg.contains("var("));
+}
+
+#[test]
+fn without_a_terminal_the_report_is_text() {
+    let desk = Desk::new();
+    session(&desk, "balance", "S1", "sequential", 1);
+    let printed = desk.succeed("report logs/S1");
+    for wanted in ["figure 24", "balance · thesis", "▁", "robot alone"] {
+        assert!(printed.contains(wanted), "{wanted}: {printed}");
+    }
+}
+
+#[test]
+fn presets_and_profiles_are_never_pooled() {
+    let desk = Desk::new();
+    session(&desk, "balance", "S1", "simultaneous", 1);
+    session(&desk, "balance", "S2", "simultaneous", 2);
+    session(&desk, "balance-modern", "S3", "simultaneous", 3);
+    session(&desk, "balance --set plant.pole_length_m=0.6", "S4", "simultaneous", 4);
+    let report = json(&desk, "report logs --json");
+    let sections = report["sections"].as_array().unwrap();
+    let mut groups: Vec<&str> =
+        sections.iter().filter_map(|s| s["title"].as_str()?.strip_prefix("Group: ")).collect();
+    groups.sort_unstable();
+    assert_eq!(
+        groups,
+        ["balance · modern", "balance · thesis", "balance · thesis · plant.pole_length_m 0.6"]
+    );
+}
+
+#[test]
+fn what_cannot_be_used_is_named_and_the_rest_reported() {
+    let desk = Desk::new();
+    session(&desk, "balance", "S1", "simultaneous", 1);
+    let good = desk.at("logs/S1/001-balance-simultaneous");
+    let spoil = |name: &str, change: &dyn Fn(&Path)| {
+        let folder = desk.at(&format!("logs/{name}/001-balance-simultaneous"));
+        copy(&good, &folder);
+        let sidecar = folder.join("session.json");
+        let renamed =
+            fs::read_to_string(&sidecar).unwrap().replace("\"S1\"", &format!("\"{name}\""));
+        fs::write(&sidecar, renamed).unwrap();
+        change(&folder);
+    };
+    let edit = |path: std::path::PathBuf, from: &str, to: &str| {
+        let changed = fs::read_to_string(&path).unwrap().replacen(from, to, 1);
+        fs::write(path, changed).unwrap();
+    };
+    spoil("NEWER", &|folder| edit(folder.join("session.json"), "\"schema\": 1", "\"schema\": 99"));
+    spoil("HEADLESS", &|folder| fs::remove_file(folder.join("session.json")).unwrap());
+    spoil("HALF", &|folder| {
+        let path = folder.join("steps.csv");
+        let rows = fs::read(&path).unwrap();
+        fs::write(&path, &rows[..rows.len() - 7]).unwrap();
+    });
+    spoil("NAN", &|folder| {
+        edit(folder.join("steps.csv"), "main,1,1,0.02,", "main,1,1,NaN,");
+        edit(folder.join("episodes.csv"), "failed,", "failed,NaN");
+    });
+    copy(&good, &desk.at("logs/again/001-balance-simultaneous"));
+    fs::create_dir_all(desk.at("logs/empty")).unwrap();
+    fs::create_dir_all(desk.at("other/src")).unwrap();
+    fs::write(desk.at("other/src/main.c"), "int main;").unwrap();
+    let report = json(&desk, "report logs logs/empty other nowhere --json");
+    let left: Vec<String> = report["left_out"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|left| {
+            format!("{}: {}", left["path"].as_str().unwrap(), left["why"].as_str().unwrap())
+        })
+        .collect();
+    for (place, why) in [
+        ("NEWER", "update coadapt"),
+        ("HEADLESS", "session.json is missing"),
+        ("HALF/001-balance-simultaneous/steps.csv", "half a row"),
+        ("NAN/001-balance-simultaneous/steps.csv", "line"),
+        ("NAN/001-balance-simultaneous/episodes.csv", "NaN"),
+        ("001-balance-simultaneous", "trial 001 of subject S1 is also in"),
+        ("logs/empty", "no session and no study"),
+        ("other", "no session and no study"),
+        ("nowhere", "cannot be read"),
+    ] {
+        let is_told = |line: &&String| line.contains(place) && line.contains(why);
+        assert!(left.iter().any(|line| is_told(&line)), "{place}, {why}: {left:#?}");
+    }
+    let subjects: Vec<&str> = report["sessions"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|session| session["subject"].as_str().unwrap())
+        .collect();
+    assert_eq!(subjects, ["HALF", "NAN", "S1"]);
+}
+
+#[test]
+fn nothing_to_report_is_wrong_usage() {
+    let desk = Desk::new();
+    fs::create_dir_all(desk.at("logs")).unwrap();
+    let output = desk.run("report logs --out page.html");
+    assert_eq!(output.status.code(), Some(2));
+    let told = text(&output.stderr);
+    assert!(told.contains("left out: logs") && told.contains("nothing to report"), "{told}");
+    assert!(!desk.at("page.html").exists());
+}
+
+#[test]
+fn a_session_that_was_cut_is_shown_but_counts_in_no_group() {
+    let desk = Desk::new();
+    session(&desk, "balance", "S1", "simultaneous", 1);
+    let folder = desk.at("logs/S1/001-balance-simultaneous");
+    let sidecar = folder.join("session.json");
+    let text = fs::read_to_string(&sidecar).unwrap();
+    fs::write(&sidecar, text.replace("\"complete\"", "\"running\"")).unwrap();
+    let report = json(&desk, "report logs --json");
+    let sections = report["sections"].as_array().unwrap();
+    assert_eq!(sections.len(), 1, "{sections:?}");
+    assert!(sections[0]["notes"].to_string().contains("counts in no group"));
+    assert!(thesis(&report).contains(&"figure 14".to_owned()));
+}
+
+#[test]
+fn swing_up_has_its_regions_and_tables() {
+    let desk = Desk::new();
+    for (subject, mode) in [("S1", "sequential"), ("S2", "simultaneous")] {
+        desk.succeed(&format!(
+            "run swing-up --headless --operator simulated:expert --subject {subject} --mode {mode} \
+             --seed 1 --duration 60 --set session.introduction_duration_s=5"
+        ));
+    }
+    let report = json(&desk, "report logs --json");
+    let figures = thesis(&report);
+    for name in ["figure 8", "figure 9", "figure 10", "table 1", "table 2"] {
+        assert!(figures.iter().any(|figure| figure == name), "{name}: {figures:?}");
+    }
+    let text = report.to_string();
+    assert!(text.contains("cos 160°") && text.contains("Top fast"), "table 1 as used");
+}
+
+#[test]
+fn a_study_has_the_figures_of_chapter_four() {
+    const CAR: &str = r#"(
+        profile: "mountain-car",
+        sets: {
+            "session.phases": [main], "session.main_rollouts": 40, "session.hold_s": 0.0,
+            "rules.cap_steps": 200, "rules.start_x": 0.42, "plant.power": 0.005,
+            "rules.reward_threshold": 1.0, "sharing.gate": 0.01, "teaching.from_gate": true,
+        },
+        arms: [(name: "sequential", mode: sequential), (name: "simultaneous", mode: simultaneous)],
+        operators: ["q_learning"],
+        seeds: (count: 2),
+        checkpoints: [50, 100],
+        readouts: [agent, continuous],
+        starts: [(name: "trained", count: 1), (name: "grid", count: 12)],
+        references: [zero],
+        compare: [(of: ("simultaneous", continuous), from: ("sequential", agent))],
+        trajectories: [4, 5, 7],
+    )"#;
+    let desk = Desk::new();
+    fs::write(desk.at("car.ron"), CAR).unwrap();
+    desk.succeed("study ./car.ron --out car");
+    let report = json(&desk, "report car --json");
+    let figures = thesis(&report);
+    for number in 45..=55 {
+        let name = format!("figure {number}");
+        assert!(figures.contains(&name), "{name}: {figures:?}");
+    }
+    assert!(report.to_string().contains("a start that was trained"));
+}
