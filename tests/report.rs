@@ -98,7 +98,8 @@ fn a_page_and_its_files_are_written_whole() {
         assert!(desk.at("data").join(name).is_file(), "{name}");
     }
     let files = names(&desk.at("data"));
-    let pictures = files.iter().filter(|name| name.ends_with(".svg")).count();
+    let pictures =
+        files.iter().filter(|name| Path::new(name).extension().is_some_and(|e| e == "svg")).count();
     assert_eq!(pictures, page.matches("<button data-save").count());
     let csv =
         fs::read_to_string(desk.at("data/S1-001-balance-simultaneous-per-rollout.csv")).unwrap();
