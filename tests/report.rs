@@ -97,6 +97,10 @@ fn a_page_and_its_files_are_written_whole() {
     for name in &named {
         assert!(desk.at("data").join(name).is_file(), "{name}");
     }
+    let files = names(&desk.at("data"));
+    let pictures =
+        files.iter().filter(|name| Path::new(name).extension().is_some_and(|e| e == "svg")).count();
+    assert_eq!(pictures, page.matches("<button data-save").count());
     let csv =
         fs::read_to_string(desk.at("data/S1-001-balance-simultaneous-per-rollout.csv")).unwrap();
     assert!(csv.starts_with("series,rollout,balance_time_s,least,most\nsimultaneous,1,"), "{csv}");
