@@ -206,18 +206,15 @@ impl<'a> Part<'a> {
     }
 
     fn generalisation(&self) -> Vec<Figure> {
-        let curve = |of: fn(&super::gather::Difference) -> f64| {
+        let curve = |of: fn(&super::gather::Difference) -> Option<f64>| {
             let series = self.sides.iter().take(MOST_PAIRS).enumerate().map(|(at, sides)| {
                 let rows = self.outcome.generalisation.iter().filter(|row| row.sides == **sides);
-                let points = rows.map(|row| (f64::from(row.checkpoint), of(row))).collect();
-                Series::new(pair(sides), Role::One(at), Mark::Linked(at), points)
+                let points = rows.filter_map(|row| Some((f64::from(row.checkpoint), of(row)?)));
+                Series::new(pair(sides), Role::One(at), Mark::Linked(at), points.collect())
             });
             series.filter(|one| !one.points.is_empty()).collect::<Vec<_>>()
         };
         let normalised = curve(|row| row.normalised_return);
-        if normalised.is_empty() {
-            return Vec::new();
-        }
         let relative = curve(|row| row.relative_to_best);
         let figure =
             |name: &str, thesis: &str, title: &str, sentence: &str, y: &str, series| Figure {
@@ -226,7 +223,7 @@ impl<'a> Part<'a> {
                 y: Axis::new(y, ""),
                 content: Content::Series(series),
             };
-        vec![
+        let figures = [
             figure(
                 "generalisation",
                 "figure 46",
@@ -247,7 +244,10 @@ impl<'a> Part<'a> {
                 "difference of nearness to the best",
                 relative,
             ),
-        ]
+        ];
+        let is_drawn =
+            |figure: &Figure| matches!(&figure.content, Content::Series(of) if !of.is_empty());
+        figures.into_iter().filter(is_drawn).collect()
     }
 
     /// The best run of each arm, where the study tells.

@@ -71,6 +71,8 @@ fn carry_out(words: &cli::StudyWords, shutdown: &Shutdown) -> Result<ExitCode, R
     let card = Card {
         version: record::VERSION.to_owned(),
         name: study.name.clone(),
+        task: study.task().to_owned(),
+        preset: study.preset().to_owned(),
         found: found_again(name),
         sets: changes.sets,
         seeds: changes.seeds,

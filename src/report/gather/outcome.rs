@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -71,8 +72,10 @@ pub struct Sides {
 pub struct Difference {
     pub sides: Sides,
     pub checkpoint: u8,
-    pub normalised_return: f64,
-    pub relative_to_best: f64,
+    /// None where the best is 0.
+    pub normalised_return: Option<f64>,
+    /// None where the best is no yardstick: not above 0.
+    pub relative_to_best: Option<f64>,
 }
 
 /// A row of `cells.csv`.
@@ -81,7 +84,7 @@ pub struct Difference {
 pub struct CellDifference {
     pub sides: Sides,
     pub place: Option<(f64, f64)>,
-    pub normalised_return: f64,
+    pub normalised_return: Option<f64>,
 }
 
 /// A row of `q-function.csv`.
@@ -122,35 +125,31 @@ pub struct CurvePoint {
     pub episode: u32,
     pub success: f64,
     pub share: f64,
-    pub value: f64,
+    /// None of a rollout that nothing ended but time.
+    pub value: Option<f64>,
 }
 
 #[derive(Deserialize)]
 struct Card {
     name: String,
-    identity: String,
+    task: String,
+    preset: String,
 }
 
 impl Document for Card {
     const KIND: &'static str = "study";
 }
 
-/// The columns of `generalisation.csv`, in order.
-type DifferenceRow = (String, String, u8, String, String, String, String, String, f64, f64, f64);
-/// Those of `trajectories.csv` before the state.
-type DrivenHead = (String, String, u32, String, String, u32, u32);
-
 impl Outcome {
     /// Reads the study in `folder`; tables that cannot be read are left out and named.
     pub(super) fn read(folder: &Path) -> Result<Self, String> {
         let card: Card =
             read_document(&folder.join("study.json")).map_err(|error| error.to_string())?;
-        let told = |key: &str| after(&card.identity, key).unwrap_or_default();
         let mut outcome = Self {
             path: folder.to_owned(),
-            name: card.name.clone(),
-            task: told("task"),
-            preset: told("preset"),
+            name: card.name,
+            task: card.task,
+            preset: card.preset,
             ..Self::default()
         };
         let figures = folder.join("figures");
@@ -218,64 +217,89 @@ fn typed<T: DeserializeOwned>(
     record.deserialize(Some(head))
 }
 
-fn difference(record: &csv::StringRecord, _: &csv::StringRecord) -> csv::Result<Difference> {
-    let row: DifferenceRow = record.deserialize(None)?;
-    let (setting, operator, checkpoint, start, arm, readout, from_arm, from_readout, ..) = row;
-    let sides = Sides { setting, operator, start, arm, readout, from_arm, from_readout };
-    Ok(Difference { sides, checkpoint, normalised_return: row.9, relative_to_best: row.10 })
+/// A row of a table, by the names of its columns.
+struct Row<'a> {
+    head: &'a csv::StringRecord,
+    record: &'a csv::StringRecord,
 }
 
-/// The labels are those of `generalisation.csv`; then come the start's number, its state, and
-/// three differences.
+impl Row<'_> {
+    fn place(&self, name: &str) -> csv::Result<usize> {
+        let missing = || std::io::Error::other(format!("the table has no column {name}")).into();
+        self.head.iter().position(|column| column == name).ok_or_else(missing)
+    }
+
+    fn text(&self, name: &str) -> csv::Result<String> {
+        let place = self.place(name)?;
+        let cut = || std::io::Error::other(format!("{name} is cut off")).into();
+        self.record.get(place).map(str::to_owned).ok_or_else(cut)
+    }
+
+    fn number<T: FromStr>(&self, name: &str) -> csv::Result<T> {
+        let text = self.text(name)?;
+        let none = |_| std::io::Error::other(format!("{name} is no number: {text:?}")).into();
+        text.parse().map_err(none)
+    }
+
+    /// None of an empty cell.
+    fn number_or_none(&self, name: &str) -> csv::Result<Option<f64>> {
+        if self.text(name)?.is_empty() { Ok(None) } else { self.number(name).map(Some) }
+    }
+
+    fn sides(&self) -> csv::Result<Sides> {
+        Ok(Sides {
+            setting: self.text("setting")?,
+            operator: self.text("operator")?,
+            start: self.text("start")?,
+            arm: self.text("arm")?,
+            readout: self.text("readout")?,
+            from_arm: self.text("from_arm")?,
+            from_readout: self.text("from_readout")?,
+        })
+    }
+}
+
+fn difference(record: &csv::StringRecord, head: &csv::StringRecord) -> csv::Result<Difference> {
+    let row = Row { head, record };
+    Ok(Difference {
+        sides: row.sides()?,
+        checkpoint: row.number("checkpoint")?,
+        normalised_return: row.number_or_none("normalised_return")?,
+        relative_to_best: row.number_or_none("relative_to_best")?,
+    })
+}
+
+/// The two columns after the start's number are the state there.
 fn cell(record: &csv::StringRecord, head: &csv::StringRecord) -> csv::Result<CellDifference> {
-    let text = |name: &str| {
-        let at = head.iter().position(|column| column == name);
-        at.and_then(|at| record.get(at)).unwrap_or_default().to_owned()
-    };
+    let row = Row { head, record };
+    let first = row.place("index")? + 1;
     let number = |at: usize| record.get(at).and_then(|cell| cell.parse().ok());
-    let normalised_return: f64 = match text("normalised_return").parse() {
-        Ok(value) => value,
-        Err(_) => return Err(std::io::Error::other("normalised_return is no number").into()),
-    };
-    let sides = Sides {
-        setting: text("setting"),
-        operator: text("operator"),
-        start: text("start"),
-        arm: text("arm"),
-        readout: text("readout"),
-        from_arm: text("from_arm"),
-        from_readout: text("from_readout"),
-    };
-    let first = head.iter().position(|column| column == "index").map_or(0, |index| index + 1);
-    Ok(CellDifference { sides, place: number(first).zip(number(first + 1)), normalised_return })
+    Ok(CellDifference {
+        sides: row.sides()?,
+        place: number(first).zip(number(first + 1)),
+        normalised_return: row.number_or_none("normalised_return")?,
+    })
 }
 
-fn driven(record: &csv::StringRecord, _: &csv::StringRecord) -> csv::Result<Driven> {
-    let labels: csv::StringRecord = record.iter().take(7).collect();
-    let (setting, arm, run, readout, start, index, step): DrivenHead = labels.deserialize(None)?;
-    let at = record.iter().skip(7).filter_map(|cell| cell.parse().ok()).collect();
-    Ok(Driven { setting, arm, run, readout, start, index, step, at })
-}
-
-/// The first text that `key` has in the profiles that `identity` holds.
-fn after(identity: &str, key: &str) -> Option<String> {
-    // The profiles stand in a JSON text, so that their quotes are escaped.
-    let (_, rest) = identity.split_once(&format!("{key}: \\\""))?;
-    rest.split_once("\\\"").map(|(value, _)| value.to_owned())
+/// All columns after the step are the state.
+fn driven(record: &csv::StringRecord, head: &csv::StringRecord) -> csv::Result<Driven> {
+    let row = Row { head, record };
+    let state = row.place("step")? + 1;
+    Ok(Driven {
+        setting: row.text("setting")?,
+        arm: row.text("arm")?,
+        run: row.number("run")?,
+        readout: row.text("readout")?,
+        start: row.text("start")?,
+        index: row.number("index")?,
+        step: row.number("step")?,
+        at: record.iter().skip(state).filter_map(|cell| cell.parse().ok()).collect(),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn task_and_preset_are_found_in_the_profile() {
-        let identity =
-            r#"["0.1.0",{},["(\n    task: \"mountain-car\",\n    preset: \"thesis\",\n"]]"#;
-        assert_eq!(after(identity, "preset").as_deref(), Some("thesis"));
-        assert_eq!(after(identity, "task").as_deref(), Some("mountain-car"));
-        assert_eq!(after(identity, "mode"), None);
-    }
 
     #[test]
     fn rows_that_are_not_whole_are_named() {

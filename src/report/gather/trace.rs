@@ -242,6 +242,8 @@ impl Portrait {
 
 #[cfg(test)]
 mod tests {
+    use std::fmt::Write;
+
     use super::*;
     use crate::report::words::plane;
     use crate::signal::Tallied;
@@ -271,14 +273,13 @@ mod tests {
                         u_applied,reward,success,region,lateness_us\n"
             .to_owned();
         for (attempt, row) in rows.iter().enumerate() {
-            for step in 0..2 {
-                text += &format!(
-                    "main,{},{step},{},0.0,0.0,0.{attempt}{step},0.0,1.0,2.0,0.5,1.5,1.5,0.0,,all,0\n",
-                    row.episode,
-                    0.02 * f64::from(step)
-                );
+            let n = row.episode;
+            for (step, t) in [(0, 0.0), (1, 0.02)] {
+                let theta = format!("0.{attempt}{step}");
+                let row = "1.0,2.0,0.5,1.5,1.5,0.0,,all,0";
+                writeln!(text, "main,{n},{step},{t},0.0,0.0,{theta},0.0,{row}").unwrap();
             }
-            text += &format!("main,{},2,0.04,0.0,0.0,0.5,0.0,,,,,,,,,0\n", row.episode);
+            writeln!(text, "main,{n},2,0.04,0.0,0.0,0.5,0.0,,,,,,,,,0").unwrap();
         }
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("steps.csv");

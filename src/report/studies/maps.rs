@@ -71,7 +71,7 @@ impl Part<'_> {
             .cells
             .iter()
             .filter(|cell| cell.sides == **sides)
-            .filter_map(|cell| Some((cell.place?, cell.normalised_return)))
+            .filter_map(|cell| Some((cell.place?, cell.normalised_return?)))
             .collect();
         let along = |of: fn(&(f64, f64)) -> f64| {
             let mut values: Vec<f64> = known.iter().map(|(place, _)| of(place)).collect();

@@ -21,6 +21,10 @@ pub struct Card {
     pub version: String,
     /// The study's name.
     pub name: String,
+    /// The task,
+    pub task: String,
+    /// and the preset of its first arm.
+    pub preset: String,
     /// How it can be found again: a name or a path,
     pub found: String,
     /// and with which changes.

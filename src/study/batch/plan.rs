@@ -162,6 +162,12 @@ impl Study {
         self.first.experiment.name()
     }
 
+    /// The preset of the first arm's profile.
+    #[must_use]
+    pub fn preset(&self) -> &str {
+        &self.first.preset
+    }
+
     /// The names of the task's states.
     #[must_use]
     pub fn columns(&self) -> &'static [&'static str] {

@@ -166,6 +166,8 @@ mod tests {
         let card = Card {
             version: "1".to_owned(),
             name: study.name.clone(),
+            task: study.task().to_owned(),
+            preset: study.preset().to_owned(),
             found: study.name.clone(),
             sets: Vec::new(),
             seeds: None,
