@@ -295,7 +295,8 @@ fn wrong_words_are_told_before_anything_is_done() {
         ("study ./balance.ron --seeds 200000", "that is too many"),
         ("study ./balance.ron --set sharing.gate=0.1,0.2 --set sharing.gate=0.3", "given twice"),
         ("study ./balance.ron --slurm=0", "1..=1000"),
-        ("study --slurm 4", "there is no study `4`"),
+        ("study ./balance.ron --slurm 1001", "1..=1000"),
+        ("study --slurm balance", "invalid value 'balance' for '--slurm"),
         ("study mime", "did you mean `mine`?"),
         ("study", "STUDY"),
         ("study merge", "DIR"),
@@ -509,7 +510,7 @@ fn a_curve_is_empty_where_nothing_is_known() {
 #[test]
 fn a_script_for_slurm_asks_for_what_runs_need() {
     let desk = desk();
-    let told = desk.succeed("study ./balance.ron --out s --slurm=3");
+    let told = desk.succeed("study ./balance.ron --out s --slurm 3");
     assert!(told.contains("3 jobs with 1 core"), "{told}");
     let script = fs::read_to_string(desk.at("s/slurm.sh")).unwrap();
     for words in ["#SBATCH --array=1-3", "--shard \"$SLURM_ARRAY_TASK_ID/3\"", "/balance.ron "] {

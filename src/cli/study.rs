@@ -19,7 +19,8 @@ Examples:
 A study is a RON file: profiles/studies/NAME.ron, built in, or a path; docs/STUDIES.md tells how to
 write one. Finished runs are kept at once: the same command goes on where it was cut. Results do not
 depend on the number of jobs. The folder gets results.csv (a row for every number), summary.json
-(means, medians, 95 % intervals, differences seed by seed) and figures/ (the data of figures).";
+(means, medians, 95 % intervals, differences seed by seed), table.txt (what is printed) and figures/
+(the data of figures).";
 
 /// The words of `study`.
 #[derive(Args, Debug)]
@@ -81,7 +82,6 @@ pub struct StudyWords {
         long,
         value_name = "JOBS",
         num_args = 0..=1,
-        require_equals = true,
         value_parser = value_parser!(u32).range(1..=1000)
     )]
     pub slurm: Option<Option<u32>>,

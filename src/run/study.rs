@@ -196,12 +196,9 @@ fn print(
     say(&format!("{name} ({task}): {done} of {runs} runs done, {} failed", failed.len()))?;
     copy(&folder.join("table.txt"))?;
     let failed = failed.iter().map(|(run, why)| format!("run {run} failed: {why}"));
-    let lines: Vec<String> = remarks.iter().cloned().chain(failed).collect();
-    say(&format!(
-        "{}\nfiles in {}",
-        lines.iter().map(|line| format!("{line}\n")).collect::<String>(),
-        folder.display()
-    ))
+    let files = format!("\nfiles in {}", folder.display());
+    let lines: Vec<String> = remarks.iter().cloned().chain(failed).chain([files]).collect();
+    say(&lines.join("\n"))
 }
 
 /// Copies a file to standard output.

@@ -252,3 +252,104 @@ impl Summary {
 fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+    use std::collections::BTreeMap;
+    use std::fs;
+
+    use super::*;
+    use crate::profile::Text;
+    use crate::study::batch::{Changes, Row};
+
+    /// Two settings, two people, two arms and seeds, and a reference of each setting.
+    fn study() -> Study {
+        let text = "(profile: \"balance\", starts: [(name: \"g\", count: 1)], references: [zero], \
+                    arms: [(name: \"a\", mode: sequential), (name: \"b\", mode: simultaneous)], \
+                    operators: [\"simulated:naive\", \"simulated:expert\"], seeds: (count: 5))";
+        let sets = vec![("sharing.gate".to_owned(), "0.2,0.3".to_owned())];
+        let changes = Changes { sets, seeds: None };
+        Study::of(&Text::new("x", text), Path::new("none"), &changes, &|| false).unwrap()
+    }
+
+    /// What balances as long as its number says; run 3 went wrong, and there is no run 4.
+    fn kept(study: &Study, number: u32) -> Option<Kept> {
+        let run = &study.runs[number as usize - 1];
+        let readout = if run.what == What::References { "zero" } else { "continuous" };
+        let row = Row {
+            checkpoint: 100,
+            readout: readout.to_owned(),
+            start: "g".to_owned(),
+            measure: "mean_balance_s".to_owned(),
+            value: f64::from(number),
+        };
+        let done = Done {
+            labels: study.labels(run),
+            rows: vec![row],
+            cells: Vec::new(),
+            curve: Vec::new(),
+            table: None,
+            trajectories: Vec::new(),
+        };
+        let outcome = match number {
+            3 => Outcome::Failed("it fell".to_owned()),
+            _ => Outcome::Done(Box::new(done)),
+        };
+        let version = String::new();
+        let kept = Kept { version, outcome, processor_s: Some(0.5), memory_mib: None };
+        (number != 4).then_some(kept)
+    }
+
+    #[test]
+    fn each_run_is_read_once_and_the_best_once_more() {
+        let (home, study) = (tempfile::tempdir().unwrap(), study());
+        let runs: Vec<&Run> = study.runs.iter().collect();
+        let times: RefCell<BTreeMap<u32, u32>> = RefCell::default();
+        let read = |number| {
+            *times.borrow_mut().entry(number).or_default() += 1;
+            kept(&study, number)
+        };
+        let manner = Manner { jobs: 3, read: &read, is_enough: &|| false };
+        let conclusion = conclude(home.path(), &study, &runs, &manner).unwrap();
+        assert_eq!((conclusion.runs, conclusion.done, conclusion.processor_s), (42, 40, 20.5));
+        assert_eq!(conclusion.missing, [4]);
+        assert_eq!(conclusion.failed, [(3, "it fell".to_owned())]);
+        let often: Vec<u32> =
+            times.borrow().iter().filter(|(_, times)| **times > 1).map(|(run, _)| *run).collect();
+        // The longest balance of each setting, person and arm.
+        assert_eq!(often, [10, 11, 20, 21, 31, 32, 41, 42]);
+        assert!(times.borrow().values().all(|times| *times <= 2));
+        let text = |name: &str| fs::read_to_string(home.path().join(name)).unwrap();
+        assert_eq!(text("results.csv").lines().count(), 1 + 40);
+        let summary: serde_json::Value = serde_json::from_str(&text("summary.json")).unwrap();
+        assert_eq!(summary["groups"].as_array().unwrap().len(), 2 * (1 + 2 * 2));
+        assert_eq!(summary["differences"].as_array().unwrap().len(), 2 * 2);
+        assert_eq!((&summary["schema"], &summary["missing"][0]), (&1.into(), &4.into()));
+        // Each table of a setting has its own reference.
+        let table = text("table.txt");
+        let references: Vec<&str> =
+            table.lines().filter(|line| line.contains("reference")).collect();
+        assert_eq!(references.len(), 4);
+        assert!(
+            references[0].contains("    1.00") && references[3].contains("   22.00"),
+            "{table}"
+        );
+    }
+
+    #[test]
+    fn a_conclusion_that_is_broken_off_leaves_what_was_there() {
+        let (home, study) = (tempfile::tempdir().unwrap(), study());
+        let runs: Vec<&Run> = study.runs.iter().collect();
+        fs::write(home.path().join("results.csv"), "before").unwrap();
+        let read = |number| kept(&study, number);
+        let manner = Manner { jobs: 1, read: &read, is_enough: &|| true };
+        let broken = conclude(home.path(), &study, &runs, &manner);
+        assert!(matches!(broken, Err(StudyError::Interrupted)));
+        let mut names: Vec<_> =
+            fs::read_dir(home.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, ["figures", "results.csv"]);
+        assert_eq!(fs::read_to_string(home.path().join("results.csv")).unwrap(), "before");
+    }
+}

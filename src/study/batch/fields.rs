@@ -93,7 +93,7 @@ impl Cell {
     /// The mean over starts; numbers that are none are left out.
     pub(super) fn mean(cells: &[(u32, Self)]) -> Self {
         let of = |number: fn(&Self) -> Option<f64>| {
-            mean_of(cells.iter().filter_map(|(_, cell)| number(cell)).collect())
+            mean_of(&cells.iter().filter_map(|(_, cell)| number(cell)).collect::<Vec<_>>())
         };
         Self {
             difference: of(|cell| Some(cell.difference)).unwrap_or_default(),
@@ -126,17 +126,17 @@ impl Cell {
             relative.push(near(*value) - near(*from));
         }
         Some(Self {
-            difference: mean_of(differences)?,
-            normalised: mean_of(normalised).filter(|number| number.is_finite()),
-            relative: mean_of(relative)
+            difference: mean_of(&differences)?,
+            normalised: mean_of(&normalised).filter(|number| number.is_finite()),
+            relative: mean_of(&relative)
                 .filter(|number| yardstick.range.is_none() && number.is_finite()),
         })
     }
 }
 
 /// The mean; none of nothing.
-fn mean_of(numbers: Vec<f64>) -> Option<f64> {
-    (!numbers.is_empty()).then(|| mean(&numbers))
+fn mean_of(numbers: &[f64]) -> Option<f64> {
+    (!numbers.is_empty()).then(|| mean(numbers))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::check::{faults, misfits};
 use super::identity::Fingerprint;
-use super::params::{Arm, Pair, Params, Setting};
+use super::params::{Arm, Pair, Params, Sets, Setting};
 use super::shard::Shard;
 use super::sweep::sweep;
 use super::{StudyError, library};
@@ -344,7 +344,7 @@ fn read_profile(
 ) -> Result<Profile, StudyError> {
     let mut document = base.clone();
     let layers = [&params.sets, &setting.sets, &arm.sets];
-    document.change(layers.into_iter().flat_map(|sets| sets.iter()));
+    document.change(layers.into_iter().flat_map(Sets::iter));
     document.set("mode", arm.mode.word());
     document.read().map_err(StudyError::Text)
 }
