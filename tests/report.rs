@@ -110,6 +110,47 @@ fn a_page_and_its_files_are_written_whole() {
 }
 
 #[test]
+fn what_was_recorded_is_never_written_over() {
+    let desk = Desk::new();
+    session(&desk, "balance", "S1", "simultaneous", 1);
+    let rows = "logs/S1/001-balance-simultaneous/steps.csv";
+    let before = fs::read(desk.at(rows)).unwrap();
+    let output = desk.run(&format!("report logs --out {rows}"));
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("choose another place"), "{}", text(&output.stderr));
+    assert_eq!(fs::read(desk.at(rows)).unwrap(), before);
+    // A page goes where it is sent, and a device stays one.
+    assert!(desk.succeed("report logs --out /dev/stdout").contains("</html>"));
+    desk.succeed("report logs --out page.html");
+    desk.succeed("report logs --out page.html");
+}
+
+/// Each folder counts its trials by itself.
+#[test]
+fn experiments_in_two_folders_may_have_the_same_subjects_and_trials() {
+    let desk = Desk::new();
+    session(&desk, "balance --logs a", "S1", "simultaneous", 1);
+    session(&desk, "balance-modern --logs b", "S1", "simultaneous", 1);
+    let report = json(&desk, "report a b --json");
+    assert_eq!(report["sessions"].as_array().unwrap().len(), 2);
+    assert_eq!(report["left_out"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn subjects_in_both_modes_are_paired_and_the_others_left_out_of_it() {
+    let desk = Desk::new();
+    for (subject, seed) in [("A1", 1), ("A2", 2), ("A3", 3)] {
+        session(&desk, "balance", subject, "sequential", seed);
+        session(&desk, "balance", subject, "simultaneous", seed + 10);
+    }
+    session(&desk, "balance", "C1", "sequential", 4);
+    let report = json(&desk, "report logs --json").to_string();
+    assert!(report.contains("n = 3 pairs"), "{report}");
+    assert!(report.contains("in one mode only: C1"), "{report}");
+    assert!(!report.contains("BCa interval"), "three pairs are too few for one");
+}
+
+#[test]
 fn without_a_terminal_the_report_is_text() {
     let desk = Desk::new();
     session(&desk, "balance", "S1", "sequential", 1);

@@ -79,6 +79,9 @@ fn look(folder: &Path, depth: u32, found: &mut Found) -> bool {
             let why = "its session.json is missing, so nobody knows what its rows are";
             found.leave_out(folder, why);
         }
+        Ok(Kind::Shelf(below)) if below.is_empty() && depth < DEPTH => {
+            found.leave_out(folder, "it holds no session and no study");
+        }
         Ok(Kind::Shelf(below)) if depth > 0 => {
             for folder in below {
                 look(&folder, depth - 1, found);
@@ -86,7 +89,8 @@ fn look(folder: &Path, depth: u32, found: &mut Found) -> bool {
         }
         Ok(Kind::Shelf(_)) => {}
         Err(error) => {
-            found.leave_out(folder, &format!("it cannot be read: {error}"));
+            let why = format!("it cannot be read ({error}); name the folder of a session or study");
+            found.leave_out(folder, &why);
             return false;
         }
     }
@@ -178,9 +182,12 @@ pub fn gather(found: Found, told: &(dyn Fn() + Sync)) -> Gathered {
 
 /// Of several sessions of one trial the one that went farthest; the others are left out.
 fn one_of_each_trial(sessions: Vec<Recorded>, left_out: &mut Vec<LeftOut>) -> Vec<Recorded> {
-    let mut trials: BTreeMap<_, Vec<Recorded>> = BTreeMap::new();
+    let mut trials = BTreeMap::<_, Vec<Recorded>>::new();
     for session in sessions {
-        trials.entry((session.subject.clone(), session.trial)).or_default().push(session);
+        let Recorded { subject, trial, task, preset, mode, .. } = &session;
+        // Folders of several experiments count their trials each by itself.
+        let key = (subject.clone(), *trial, task.clone(), preset.clone(), mode.word());
+        trials.entry(key).or_default().push(session);
     }
     let mut kept = Vec::new();
     for (_, mut same) in trials {

@@ -130,32 +130,43 @@ fn write_item(item: &Item, folder: &Path) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Writes a file that is there whole or not at all.
+/// Writes a file that is there whole or not at all; where something that is no file is there, as
+/// a pipe, to that. What was recorded is not written over.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
+    // A link stays one.
+    let path = &fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
+    if ["session.json", "study.json"].iter().any(|name| folder.join(name).exists()) {
+        return Err(RunError::Usage(format!(
+            "{} holds a session or a study, whose files stay as they are: choose another place",
+            folder.display()
+        )));
+    }
     let write = || -> io::Result<()> {
-        let mut file = tempfile::NamedTempFile::new_in(folder)?;
+        if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+            return fs::OpenOptions::new().write(true).open(path)?.write_all(bytes);
+        }
+        let mut file = for_all(&mut tempfile::Builder::new()).tempfile_in(folder)?;
         file.write_all(bytes)?;
-        permit(file.as_file())?;
         file.persist(path).map_err(|error| error.error)?;
         Ok(())
     };
     write().map_err(|error| failed("write", path, &error))
 }
 
-/// A temporary file is for its owner only; a report is for whom the folder is.
-#[cfg(unix)]
-fn permit(file: &fs::File) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt as _;
-    file.set_permissions(fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn permit(_: &fs::File) -> io::Result<()> {
-    Ok(())
+/// A temporary file is for its owner only; a report is for whom the user's mask says.
+fn for_all<'a, 'b, 'c>(
+    builder: &'c mut tempfile::Builder<'a, 'b>,
+) -> &'c mut tempfile::Builder<'a, 'b> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder
 }
 
 fn failed(action: &str, path: &Path, error: &io::Error) -> RunError {

@@ -9,7 +9,7 @@ use crate::report::gather::Recorded;
 use crate::report::metrics::{deviation, mean};
 use crate::report::series::WINDOW;
 use crate::report::session::with_unit;
-use crate::report::spread::median;
+use crate::report::spread::{LEAST_VALUES, median};
 use crate::report::statistics::{Comparison, Test, compare, compare_paired};
 use crate::report::words;
 use crate::session::Phase;
@@ -47,7 +47,7 @@ fn measures(task: &str) -> [Measure; 3] {
 enum Pairing {
     /// They do not.
     None,
-    /// They are the same people.
+    /// They are the same people, or some are: whoever was in one mode only is left out.
     Subjects,
     /// They are simulated, with the same seeds.
     Seeds,
@@ -62,7 +62,7 @@ impl Pairing {
             seeds.dedup();
             seeds
         });
-        if names[0] == names[1] {
+        if names[0].iter().any(|name| names[1].contains(name)) {
             Self::Subjects
         } else if is_simulated && seeds[0] == seeds[1] && seeds[0].len() == names[0].len() {
             Self::Seeds
@@ -102,6 +102,22 @@ fn single_seed(subject: &Subject<'_>) -> Option<u64> {
     }
 }
 
+/// Those who were in one mode only.
+fn in_one_mode(arms: &[Vec<Subject<'_>>; 2]) -> Option<String> {
+    let is_in = |arm: &[Subject<'_>], name: &str| arm.iter().any(|one| one.name == name);
+    let names = arms.iter().flatten().map(|one| one.name);
+    let mut alone: Vec<&str> =
+        names.filter(|name| !arms.iter().all(|arm| is_in(arm, name))).collect();
+    alone.sort_unstable();
+    (!alone.is_empty()).then(|| alone.join(", "))
+}
+
+/// A bootstrap of few values is too narrow to be told.
+fn without_narrow_interval(compared: Comparison) -> Comparison {
+    let is_wide_enough = compared.n.0.min(compared.n.1) >= LEAST_VALUES;
+    Comparison { interval95: compared.interval95.filter(|_| is_wide_enough), ..compared }
+}
+
 /// Compares the modes of `group`.
 pub(super) fn table(group: &Group<'_>) -> Compared {
     let arms = [group.arm(Mode::Simultaneous), group.arm(Mode::Sequential)];
@@ -118,6 +134,7 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
             Pairing::None => compare(&a, &b, SEED),
             _ => compare_paired(&a, &b, SEED),
         };
+        let compared = compared.map(without_narrow_interval);
         if let Some(compared) = &compared {
             sentences.push(format!(
                 "{}, simultaneous against sequential: {compared}.",
@@ -132,6 +149,11 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
         let few = "Too few subjects for a test: it takes at least two in each mode.";
         sentences.push(few.to_owned());
     }
+    if pairing == Pairing::Subjects
+        && let Some(who) = in_one_mode(&arms)
+    {
+        sentences.push(format!("Left out, as they were in one mode only: {who}."));
+    }
     let (few, paired) = match pairing {
         Pairing::None => ("subjects are dealt to the modes", ""),
         Pairing::Subjects => ("differences of subjects change their sign", ", paired by subject"),
@@ -139,8 +161,8 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
     };
     let sentence = format!(
         "Simultaneous against sequential mode{paired}: means ± standard deviation over subjects, \
-         medians, the difference of means with its 95 % interval (BCa bootstrap), Hedges' g, and \
-         the chance p of such a difference if the mode did not matter. With few subjects p counts \
+         medians, the difference of means with its 95 % interval (BCa bootstrap; from {LEAST_VALUES} \
+         subjects on, of fewer it would be too narrow), Hedges' g, and the chance p of such a difference if the mode did not matter. With few subjects p counts \
          every way in which {few}; none of the rows is corrected for the others."
     );
     let table = Table {
