@@ -204,15 +204,14 @@ fn plots(series: &Series) -> Vec<Plot> {
     };
     let mut plots = Vec::new();
     if !matches!(series.mark, Mark::Shape(_)) {
-        for piece in series.pieces() {
+        for (piece, spread) in series.pieces_within() {
             let mut line = LinePlot::new()
                 .with_data(piece.iter().copied())
                 .with_color(colour(series.role))
                 .with_stroke_width(width)
                 .with_line_style(style.clone());
-            if let Some(spread) = &series.spread
+            if let Some(spread) = spread
                 && series.points.len() > MOST_BARS
-                && spread.len() == piece.len()
             {
                 line = line
                     .with_band(spread.iter().map(|pair| pair.0), spread.iter().map(|pair| pair.1));
@@ -233,11 +232,10 @@ fn shapes(series: &Series, shape: usize) -> ScatterPlot {
         .with_color(colour(series.role))
         .with_size(if points.len() <= 2 { 5.0 } else { 3.0 })
         .with_marker(marker(shape));
-    if let Some(spread) = &series.spread
-        && spread.len() == points.len()
-        && points.len() <= MOST_BARS
-    {
-        let around = points.iter().zip(spread);
+    let spread: Vec<(f64, f64)> =
+        series.pieces_within().into_iter().filter_map(|piece| piece.1).flatten().copied().collect();
+    if spread.len() == points.len() && series.points.len() <= MOST_BARS {
+        let around = points.iter().zip(&spread);
         let errors: Vec<(f64, f64)> =
             around.map(|((_, y), (least, most))| (y - least, most - y)).collect();
         scatter = scatter.with_y_err_asymmetric(errors);

@@ -71,6 +71,22 @@ impl Series {
         let is_whole = |&(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
         self.points.split(move |point| !is_whole(point)).filter(|piece| !piece.is_empty())
     }
+
+    /// The unbroken parts of it, each with its part of the spread, where there is one.
+    #[must_use]
+    pub fn pieces_within(&self) -> Vec<(&[(f64, f64)], Option<&[(f64, f64)]>)> {
+        let is_whole = |&(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
+        let mut from = 0;
+        let mut pieces = Vec::new();
+        for piece in self.points.split(|point| !is_whole(point)) {
+            let spread = self.spread.as_ref().and_then(|all| all.get(from..from + piece.len()));
+            from += piece.len() + 1;
+            if !piece.is_empty() {
+                pieces.push((piece, spread));
+            }
+        }
+        pieces
+    }
 }
 
 /// An axis.
@@ -398,6 +414,10 @@ mod tests {
         let points = vec![(0.0, 1.0), (1.0, 2.0), (f64::NAN, 0.0), (2.0, 3.0)];
         let series = Series::new("a", Role::Plain, Mark::Line, points);
         assert_eq!(series.pieces().map(<[_]>::len).collect::<Vec<_>>(), [2, 1]);
+        let spread: Vec<(f64, f64)> = (0..4).map(|at| (f64::from(at), 9.0)).collect();
+        let series = series.within(spread.clone());
+        let pieces = series.pieces_within();
+        assert_eq!((pieces[0].1, pieces[1].1), (Some(&spread[..2]), Some(&spread[3..])));
     }
 
     #[test]

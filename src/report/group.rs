@@ -12,8 +12,8 @@ use super::achieved::{Achieved, yardstick};
 use super::figure::{Axis, Caption, Content, Figure, Item, Mark, Role, Section, Series, real};
 use super::gather::Recorded;
 use super::metrics::{deviation, mean};
-use super::series::{WINDOW, moving_average, over_rows};
-use super::session::{line, measure, measured, numbered, role, with_unit};
+use super::series::{ByRollout, WINDOW, along, moving_average, numbers, over_rows, with_gaps};
+use super::session::{line, measure, measured, numbered, of_main, role, with_unit};
 use super::words;
 use crate::record::EpisodeRow;
 use crate::session::Phase;
@@ -53,10 +53,10 @@ impl Subject<'_> {
         (!values.is_empty()).then(|| mean(&values))
     }
 
-    /// The mean over its sessions of a list that each has, place by place.
-    fn mean_row(&self, of: impl Fn(&Recorded) -> Vec<f64>) -> Vec<f64> {
-        let rows: Vec<Vec<f64>> = self.sessions.iter().map(|session| of(session)).collect();
-        over_rows(&rows).into_iter().map(|(_, mean, ..)| mean).collect()
+    /// The mean over its sessions of numbers that each has, rollout by rollout.
+    fn mean_row(&self, of: impl Fn(&Recorded) -> ByRollout) -> ByRollout {
+        let rows: Vec<ByRollout> = self.sessions.iter().map(|session| of(session)).collect();
+        over_rows(&rows).into_iter().map(|(rollout, (mean, _))| (rollout, mean)).collect()
     }
 }
 
@@ -66,9 +66,11 @@ fn average(session: &Recorded, phase: Phase) -> Option<f64> {
     if rows.is_empty() { None } else { Achieved::of(&session.task, &rows).mean() }
 }
 
-/// What each rollout of main is measured by.
-fn curve(session: &Recorded) -> Vec<f64> {
-    measured(&session.task, &session.of_phase(Phase::Main))
+/// What the last rollouts of main are measured by, on average.
+fn last_average(session: &Recorded) -> Option<f64> {
+    let values = numbers(&measured(session));
+    let last = &values[values.len().saturating_sub(WINDOW)..];
+    (!last.is_empty()).then(|| mean(last))
 }
 
 /// What the policy of each tenth is measured by alone: percent and mean.
@@ -171,10 +173,12 @@ impl<'a> Group<'a> {
         let axis = measure(self.task);
         let mut series = Vec::new();
         for (mode, arm) in self.arms() {
-            let curves: Vec<Vec<f64>> = arm.iter().map(|one| one.mean_row(curve)).collect();
+            let curves: Vec<ByRollout> = arm.iter().map(|one| one.mean_row(measured)).collect();
             let rows = over_rows(&curves);
-            let points = rows.iter().map(|row| (real(row.0), row.1)).collect();
-            let band = rows.iter().map(|row| (row.1 - row.2, row.1 + row.2)).collect();
+            let rows = with_gaps(&rows).into_iter();
+            let rows = rows.map(|(at, row)| (at, row.copied().unwrap_or((f64::NAN, f64::NAN))));
+            let (points, band) =
+                rows.map(|(at, (mean, sd))| ((at, mean), (mean - sd, mean + sd))).unzip();
             series.push(Series::new(mode.word(), role(mode), line(mode), points).within(band));
         }
         let sentence = format!(
@@ -196,10 +200,9 @@ impl<'a> Group<'a> {
         let axis = measure(self.task);
         let mut series = Vec::new();
         for (mode, arm) in self.arms() {
-            let curves: Vec<Vec<f64>> = arm.iter().map(|one| one.mean_row(curve)).collect();
-            let means: Vec<f64> = over_rows(&curves).into_iter().map(|row| row.1).collect();
-            let averages = moving_average(&means, WINDOW);
-            let points = averages.into_iter().map(|(at, value)| (real(at), value)).collect();
+            let curves: Vec<ByRollout> = arm.iter().map(|one| one.mean_row(measured)).collect();
+            let means = over_rows(&curves).into_iter().map(|(rollout, row)| (rollout, row.0));
+            let points = along(&moving_average(&means.collect(), WINDOW));
             series.push(Series::new(mode.word(), role(mode), line(mode), points));
         }
         series.retain(|one| !one.points.is_empty());
@@ -235,12 +238,8 @@ impl<'a> Group<'a> {
         let arm = self.arm(mode);
         let mut series = Vec::new();
         for (at, subject) in arm.iter().enumerate() {
-            // All rollouts, so that places are rollouts: what is not known yet is a break.
-            let row = subject.mean_row(|session| {
-                let rows = session.of_phase(Phase::Main);
-                rows.iter().map(|row| of(row).map_or(f64::NAN, |value| 100.0 * value)).collect()
-            });
-            let points = row.iter().enumerate().map(|(n, value)| (real(n + 1), *value)).collect();
+            let percent = |row: &EpisodeRow| of(row).map(|value| 100.0 * value);
+            let points = along(&subject.mean_row(|session| of_main(session, percent)));
             let mark = match at % 3 {
                 0 => Mark::Line,
                 1 => Mark::Dashed,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Group, Subject, average, curve};
+use super::{Group, Subject, average, last_average};
 use crate::report::achieved::yardstick;
 use crate::report::figure::{Caption, Table};
 use crate::report::gather::Recorded;
@@ -34,11 +34,7 @@ fn measures(task: &str) -> [Measure; 3] {
     [
         (format!("{name}, robot alone"), |session| average(session, Phase::Autonomous)),
         (format!("{name}, teaching"), |session| average(session, Phase::Main)),
-        (format!("{name}, last {WINDOW} rollouts"), |session| {
-            let values = curve(session);
-            let last = &values[values.len().saturating_sub(WINDOW)..];
-            (!last.is_empty()).then(|| mean(last))
-        }),
+        (format!("{name}, last {WINDOW} rollouts"), last_average),
     ]
 }
 
