@@ -100,7 +100,7 @@ fn colour(role: Role) -> String {
 /// The dashes and the width of a line, in the picture and in its legend.
 const fn dashes(mark: Mark) -> (Option<&'static str>, f64) {
     match mark {
-        Mark::Linked(at) if at % 2 == 1 => (Some("7 4"), 1.6),
+        Mark::DashLinked(_) => (Some("7 4"), 1.6),
         Mark::Line | Mark::Shape(_) => (None, 1.8),
         Mark::Linked(_) => (None, 1.6),
         Mark::Dashed => (Some("7 4"), 1.8),
@@ -199,7 +199,7 @@ fn plots(series: &Series) -> Vec<Plot> {
     let (dashes, width) = dashes(series.mark);
     let style = dashes.map_or(LineStyle::Solid, |dashes| LineStyle::Custom(dashes.to_owned()));
     let shape = match series.mark {
-        Mark::Shape(shape) | Mark::Linked(shape) => Some(shape),
+        Mark::Shape(shape) | Mark::Linked(shape) | Mark::DashLinked(shape) => Some(shape),
         _ => None,
     };
     let mut plots = Vec::new();

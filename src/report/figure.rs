@@ -36,6 +36,8 @@ pub enum Mark {
     Shape(usize),
     /// Line and shapes.
     Linked(usize),
+    /// Dashed line and shapes.
+    DashLinked(usize),
 }
 
 /// Some numbers that belong together.

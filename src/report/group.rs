@@ -13,7 +13,9 @@ use super::figure::{Axis, Caption, Content, Figure, Item, Mark, Role, Section, S
 use super::gather::Recorded;
 use super::metrics::{deviation, mean};
 use super::series::{ByRollout, WINDOW, along, moving_average, numbers, over_rows, with_gaps};
-use super::session::{line, measure, measured, numbered, of_main, role, with_unit};
+use super::session::{
+    line, linked, measure, measured, numbered, of_main, role, shape, subject, with_unit,
+};
 use super::words;
 use crate::record::EpisodeRow;
 use crate::session::Phase;
@@ -289,8 +291,8 @@ impl<'a> Group<'a> {
     fn autonomous(&self) -> Option<Figure> {
         let axis = measure(self.task);
         let (mut series, mut names, mut told) = (Vec::new(), Vec::new(), Vec::new());
-        for (at, (mode, subjects)) in self.alone().into_iter().enumerate() {
-            let place = real(at + 1);
+        for (place, (mode, subjects)) in (1_u8..).zip(self.alone()) {
+            let place = f64::from(place);
             let values: Vec<f64> = subjects.iter().map(|(_, value)| *value).collect();
             let (mean, sd) = (mean(&values), deviation(&values));
             let spread = sd.unwrap_or(0.0);
@@ -298,14 +300,14 @@ impl<'a> Group<'a> {
                 Series::new(
                     format!("{}, mean ± sd", mode.word()),
                     role(mode),
-                    Mark::Shape(at),
+                    shape(mode),
                     vec![(place, mean)],
                 )
                 .within(vec![(mean - spread, mean + spread)]),
             );
             let beside = values.iter().map(|value| (place + 0.25, *value)).collect();
             let label = format!("{}, each subject", mode.word());
-            series.push(Series::new(label, role(mode), Mark::Shape(at + 3), beside));
+            series.push(Series::new(label, role(mode), shape(mode), beside));
             names.push((place, mode.word().to_owned()));
             let sd = sd.map_or(String::new(), |sd| format!(" ± {}", with_unit(self.task, sd)));
             let n = words::counted(values.len(), "subject");
@@ -332,14 +334,14 @@ impl<'a> Group<'a> {
         let better_is_more = yardstick(self.task).more_is_better;
         let mut series = Vec::new();
         let mut longest = 0;
-        for (at, (mode, subjects)) in self.alone().into_iter().enumerate() {
+        for (mode, subjects) in self.alone() {
             let mut values: Vec<f64> = subjects.iter().map(|(_, value)| *value).collect();
             values.sort_by(f64::total_cmp);
             if !better_is_more {
                 values.reverse();
             }
             longest = longest.max(values.len());
-            series.push(Series::new(mode.word(), role(mode), Mark::Linked(at), numbered(&values)));
+            series.push(Series::new(mode.word(), role(mode), linked(mode), numbered(&values)));
         }
         let zero: Vec<f64> = self
             .sessions
@@ -348,12 +350,17 @@ impl<'a> Group<'a> {
             .collect();
         if !zero.is_empty() {
             let ends = vec![(1.0, mean(&zero)), (real(longest.max(2)), mean(&zero))];
-            series.push(Series::new("zero control", Role::Plain, Mark::Dashed, ends));
+            series.push(Series::new("zero control", Role::Plain, Mark::Dotted, ends));
         }
+        let nobody = if zero.is_empty() {
+            ""
+        } else {
+            "; the dotted line is what nobody at the controls comes to"
+        };
         let number = if self.task == SwingUp::NAME { 10 } else { 36 };
         let sentence = format!(
             "The {} of each subject's final policy alone, the subjects of each group sorted \
-             from the worst to the best; the dashed line is what nobody at the controls comes to.",
+             from the worst to the best{nobody}.",
             words::mean_of(&axis.label)
         );
         let title = format!("{} of the robot alone, subjects sorted", words::heading(&axis.label));
@@ -400,12 +407,12 @@ impl<'a> Group<'a> {
                 let points = tenths.into_iter().map(|(percent, v)| (f64::from(percent), v));
                 let label = format!("{name} ({})", mode.word());
                 let role = role(mode);
-                series.push(Series::new(label, role, Mark::Linked(at), points.collect()));
+                series.push(Series::new(label, role, subject(mode, at), points.collect()));
             }
         }
         let sentence = format!(
-            "The {} of each subject's robot alone after each tenth of main; colours tell the \
-             groups apart, shapes the subjects.",
+            "The {} of each subject's robot alone after each tenth of main; colours and lines \
+             tell the groups apart, shapes the subjects.",
             words::mean_of(&axis.label)
         );
         let title = format!("{} of the robot alone after each tenth", words::heading(&axis.label));
@@ -444,8 +451,7 @@ impl<'a> Group<'a> {
                     if by_ratio { format!("{last:.0} %") } else { with_unit(self.task, *last) };
                 told.push(format!("{} {last}", mode.word()));
             }
-            let at = usize::from(mode == Mode::Sequential);
-            series.push(Series::new(mode.word(), role(mode), Mark::Linked(at), points));
+            series.push(Series::new(mode.word(), role(mode), linked(mode), points));
         }
         let sentence = format!(
             "How much better the mean of each group's robots alone is than after the first tenth \

@@ -1,6 +1,6 @@
 //! A subject who took part in both modes: figures 14, 15, 20 and 23, both overlaid.
 
-use super::figure::{Axis, Caption, Content, Figure, Item, Section, Series};
+use super::figure::{Axis, Caption, Content, Figure, Item, Mark, Section, Series};
 use super::metrics::mean;
 use super::series::{NEIGHBOURS, WINDOW, along, average_around, moving_average, numbers};
 use super::session::{
@@ -107,7 +107,8 @@ fn around_starts(views: [View<'_>; 2], phase: Phase) -> Option<Figure> {
         let around = average_around(points, NEIGHBOURS);
         series.push(Series::new(mode.word(), role(mode), line(mode), around));
         let label = format!("mean, {}", mode.word());
-        series.push(Series { role: role(mode), ..level(&label, average, points) });
+        let mean = level(&label, average, points);
+        series.push(Series { role: role(mode), mark: Mark::Dotted, ..mean });
     }
     let (name, number, who) = if phase == Phase::Main {
         ("by-start", 20, "while teaching")

@@ -81,6 +81,24 @@ pub const fn shape(mode: Mode) -> Mark {
     }
 }
 
+/// The line and the shape of `mode`.
+#[must_use]
+pub const fn linked(mode: Mode) -> Mark {
+    match mode {
+        Mode::Simultaneous => Mark::Linked(0),
+        Mode::Sequential => Mark::DashLinked(1),
+    }
+}
+
+/// The line of `mode` with the shape of one subject, the `at`-th of its group.
+#[must_use]
+pub const fn subject(mode: Mode, at: usize) -> Mark {
+    match mode {
+        Mode::Simultaneous => Mark::Linked(at),
+        Mode::Sequential => Mark::DashLinked(at),
+    }
+}
+
 /// The axis of what `task` is measured by.
 #[must_use]
 pub fn measure(task: &str) -> Axis {

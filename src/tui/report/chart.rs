@@ -67,7 +67,7 @@ fn look_of(series: &Series, at: usize, glyphs: Glyphs) -> (Role, Marker, char) {
         Mark::Thin => (role, line, '·'),
         Mark::Dashed => (role, Marker::Custom('-'), '-'),
         Mark::Dotted => (role, Marker::Custom('\''), '\''),
-        Mark::Shape(shape) | Mark::Linked(shape) => {
+        Mark::Shape(shape) | Mark::Linked(shape) | Mark::DashLinked(shape) => {
             let sign =
                 SIGNS[(shape + usize::from(matches!(series.role, Meaning::One(_))) * at) % 6];
             (role, Marker::Custom(sign), sign)
