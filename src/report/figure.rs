@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::statistics::Comparison;
+
 /// What a colour stands for, the same in all figures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -53,19 +55,28 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
     /// Around each point the least and the most, where there is a spread.
     pub spread: Option<Vec<(f64, f64)>>,
+    /// Whose each point is, where each is a subject's; else nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub subjects: Vec<String>,
 }
 
 impl Series {
     /// A series without spread.
     #[must_use]
     pub fn new(label: impl Into<String>, role: Role, mark: Mark, points: Vec<(f64, f64)>) -> Self {
-        Self { label: label.into(), role, mark, points, spread: None }
+        Self { label: label.into(), role, mark, points, spread: None, subjects: Vec::new() }
     }
 
     /// With this spread around its points.
     #[must_use]
     pub fn within(self, spread: Vec<(f64, f64)>) -> Self {
         Self { spread: Some(spread), ..self }
+    }
+
+    /// With these subjects, one a point.
+    #[must_use]
+    pub fn each_of(self, subjects: Vec<String>) -> Self {
+        Self { subjects, ..self }
     }
 
     /// The unbroken parts of it.
@@ -271,14 +282,19 @@ impl Figure {
         let (x, y) = (self.x.column(), self.y.column());
         match &self.content {
             Content::Series(series) => {
-                rows.write_record(["series", &x, &y, "least", "most"])?;
+                let has_subjects = series.iter().any(|one| !one.subjects.is_empty());
+                let subject = has_subjects.then_some("subject");
+                let head = ["series"].into_iter().chain(subject);
+                rows.write_record(head.chain([&*x, &*y, "least", "most"]))?;
                 for one in series {
                     for (index, (x, y)) in one.points.iter().enumerate() {
                         let spread = one.spread.as_ref().and_then(|spread| spread.get(index));
                         let (least, most) = spread.map_or((f64::NAN, f64::NAN), |pair| *pair);
                         let cells = [*x, *y, least, most].map(cell);
+                        let subject = one.subjects.get(index).map_or("", String::as_str);
                         rows.write_record(
                             std::iter::once(one.label.as_str())
+                                .chain(has_subjects.then_some(subject))
                                 .chain(cells.iter().map(String::as_str)),
                         )?;
                     }
@@ -337,6 +353,24 @@ pub struct Section {
     pub items: Vec<Item>,
 }
 
+/// A comparison of two modes, in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Contrast {
+    /// Task and preset.
+    pub preset: String,
+    /// What is compared,
+    pub measure: String,
+    /// and its unit; empty where it has none.
+    pub unit: &'static str,
+    /// The modes: the first is compared with the second.
+    pub of: [&'static str; 2],
+    /// What tells which values belong together; none where they are of groups of their own.
+    pub paired_by: Option<&'static str>,
+    /// What came of it.
+    #[serde(flatten)]
+    pub comparison: Comparison,
+}
+
 /// Something that is not in the report, and why.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct LeftOut {
@@ -353,6 +387,8 @@ pub struct Report {
     pub title: String,
     /// Its parts.
     pub sections: Vec<Section>,
+    /// Its comparisons of modes.
+    pub comparisons: Vec<Contrast>,
     /// What is not in it.
     pub left_out: Vec<LeftOut>,
 }
@@ -400,6 +436,18 @@ mod tests {
             item.csv(),
             "series,release_angle_deg,balance_time_s,least,most\n\
              main,1,0.5,0.25,0.75\nmain,2,,,\n"
+        );
+    }
+
+    #[test]
+    fn the_data_file_names_the_subjects_of_points() {
+        let mean = Series::new("mean", Role::Plain, Mark::Shape(0), vec![(1.0, 2.0)]);
+        let each = Series::new("each", Role::Plain, Mark::Shape(0), vec![(1.0, 3.0)]);
+        let item = figure(Content::Series(vec![mean, each.each_of(vec!["S01".to_owned()])]));
+        assert_eq!(
+            item.csv(),
+            "series,subject,release_angle_deg,balance_time_s,least,most\n\
+             mean,,1,2,,\neach,S01,1,3,,\n"
         );
     }
 

@@ -9,7 +9,9 @@ mod tables;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::achieved::{Achieved, yardstick};
-use super::figure::{Axis, Caption, Content, Figure, Item, Mark, Role, Section, Series, real};
+use super::figure::{
+    Axis, Caption, Content, Contrast, Figure, Item, Mark, Role, Section, Series, real,
+};
 use super::gather::Recorded;
 use super::metrics::{deviation, mean};
 use super::series::{ByRollout, WINDOW, along, moving_average, numbers, over_rows, with_gaps};
@@ -87,9 +89,9 @@ fn tenths(session: &Recorded) -> BTreeMap<u8, f64> {
     rows.into_iter().filter_map(mean_of).collect()
 }
 
-/// The part of a report that shows `group`.
+/// The part of a report that shows `group`, and its comparisons.
 #[must_use]
-pub fn section(group: &Group<'_>) -> Section {
+pub fn section(group: &Group<'_>) -> (Section, Vec<Contrast>) {
     let mut items = Vec::new();
     let comparison = compared::table(group);
     items.extend(comparison.table.map(Item::Table));
@@ -116,7 +118,8 @@ pub fn section(group: &Group<'_>) -> Section {
     items.extend(figures.map(Item::Figure));
     let mut notes = group.notes();
     notes.extend(comparison.sentences);
-    Section { title: format!("Group: {}", group.preset), notes, items }
+    let title = format!("Group: {}", group.preset);
+    (Section { title, notes, items }, comparison.contrasts)
 }
 
 impl<'a> Group<'a> {
@@ -307,7 +310,8 @@ impl<'a> Group<'a> {
             );
             let beside = values.iter().map(|value| (place + 0.25, *value)).collect();
             let label = format!("{}, each subject", mode.word());
-            series.push(Series::new(label, role(mode), shape(mode), beside));
+            let who = subjects.iter().map(|(name, _)| (*name).to_owned()).collect();
+            series.push(Series::new(label, role(mode), shape(mode), beside).each_of(who));
             names.push((place, mode.word().to_owned()));
             let sd = sd.map_or(String::new(), |sd| format!(" ± {}", with_unit(self.task, sd)));
             let n = words::counted(values.len(), "subject");
@@ -334,14 +338,16 @@ impl<'a> Group<'a> {
         let better_is_more = yardstick(self.task).more_is_better;
         let mut series = Vec::new();
         let mut longest = 0;
-        for (mode, subjects) in self.alone() {
-            let mut values: Vec<f64> = subjects.iter().map(|(_, value)| *value).collect();
-            values.sort_by(f64::total_cmp);
+        for (mode, mut subjects) in self.alone() {
+            subjects.sort_by(|a, b| a.1.total_cmp(&b.1));
             if !better_is_more {
-                values.reverse();
+                subjects.reverse();
             }
-            longest = longest.max(values.len());
-            series.push(Series::new(mode.word(), role(mode), linked(mode), numbered(&values)));
+            longest = longest.max(subjects.len());
+            let (who, values): (Vec<String>, Vec<f64>) =
+                subjects.into_iter().map(|(name, value)| (name.to_owned(), value)).unzip();
+            let sorted = Series::new(mode.word(), role(mode), linked(mode), numbered(&values));
+            series.push(sorted.each_of(who));
         }
         let zero: Vec<f64> = self
             .sessions

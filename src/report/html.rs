@@ -195,6 +195,7 @@ mod tests {
                 notes: vec!["A note.".to_owned()],
                 items: vec![Item::Figure(figure), Item::Table(table)],
             }],
+            comparisons: vec![],
             left_out: vec![LeftOut { path: "logs/x".to_owned(), why: "it is empty".to_owned() }],
         }
     }

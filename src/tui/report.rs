@@ -292,6 +292,7 @@ mod tests {
                 section("Group: balance · thesis", vec![Item::Table(table), Item::Figure(figure)]),
                 section("S01 001", vec![]),
             ],
+            comparisons: vec![],
             left_out: vec![LeftOut { path: "logs/x".to_owned(), why: "it is empty".to_owned() }],
         }
     }
