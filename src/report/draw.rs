@@ -28,6 +28,8 @@ const HEIGHT: f64 = 300.0;
 const CELLS_HEIGHT: f64 = 330.0;
 /// Size of all text.
 const TEXT: u32 = 13;
+/// The most ticks of an axis of whole numbers.
+const MOST_TICKS: f64 = 7.0;
 /// Above so many points of a series its spread is a band, not bars.
 const MOST_BARS: usize = 12;
 
@@ -162,10 +164,19 @@ fn drawn(figure: &Figure) -> String {
         layout = layout.with_x_axis_min(least).with_x_axis_max(most + beyond);
     }
     if let Some((least, most)) = figure.y.range {
-        layout = layout.with_y_axis_min(least).with_y_axis_max(most);
+        // Room for a line along the upper end.
+        let is_plane = matches!(figure.content, Content::Cells(_));
+        let beyond = if is_plane { 0.0 } else { 0.02 * (most - least) };
+        layout = layout.with_y_axis_min(least).with_y_axis_max(most + beyond);
     }
     if let Some(ground) = figure.ground() {
         layout = layout.with_y_axis_min(ground);
+    }
+    if let Some(step) = whole_step(&figure.x, layout.x_range) {
+        layout = layout.with_x_tick_step(step);
+    }
+    if let Some(step) = whole_step(&figure.y, layout.y_range) {
+        layout = layout.with_y_tick_step(step);
     }
     if !figure.x.names.is_empty() {
         layout = layout.with_x_tick_step(1.0).with_x_tick_format(names(&figure.x));
@@ -183,6 +194,14 @@ fn with_legend(svg: &str, series: &[Series]) -> String {
     let taller =
         svg.replacen(&format!("height=\"{HEIGHT}\""), &format!("height=\"{}\"", HEIGHT + more), 1);
     taller.replacen("</svg>", &format!("{legend}</svg>"), 1)
+}
+
+/// How far the ticks of an axis of whole numbers are apart: 1, 2 or 5 times a power of ten.
+fn whole_step(axis: &Axis, (least, most): (f64, f64)) -> Option<f64> {
+    let powers = (0..9).map(|power| 10_f64.powi(power));
+    let mut steps = powers.flat_map(|power| [1.0, 2.0, 5.0].map(|step| step * power));
+    let is_wide_enough = |step: &f64| *step * MOST_TICKS >= most - least;
+    steps.find(is_wide_enough).filter(|_| axis.is_whole)
 }
 
 /// Words at the places of the axis that have one.
@@ -368,6 +387,13 @@ mod tests {
         shortened("<path d=\"M 1.25 -3.75L10 2\"/>", &mut out);
         assert_eq!(out, "<path d=\"M 1.2 -3.7L10 2\"/>");
         assert!(trimmed("<svg><text x=\"1.25\">1.25</text></svg>").contains(">1.25<"));
+    }
+
+    #[test]
+    fn counts_have_whole_ticks() {
+        let step = |most: f64| whole_step(&Axis::whole("rollout"), (0.0, most));
+        assert_eq!([3.0, 14.0, 25.0, 100.0].map(step), [1.0, 2.0, 5.0, 20.0].map(Some));
+        assert_eq!(whole_step(&Axis::new("time", "s"), (0.0, 3.0)), None);
     }
 
     #[test]

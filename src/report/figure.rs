@@ -113,6 +113,12 @@ pub struct Axis {
     pub range: Option<(f64, f64)>,
     /// Words in place of numbers.
     pub names: Vec<(f64, String)>,
+    /// Below which nothing can be, such as 0 of times: nothing below is shown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub floor: Option<f64>,
+    /// Whether only whole numbers are on it, as of counts.
+    #[serde(skip)]
+    pub is_whole: bool,
 }
 
 impl Axis {
@@ -120,6 +126,12 @@ impl Axis {
     #[must_use]
     pub fn new(label: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { label: label.into(), unit: unit.into(), ..Self::default() }
+    }
+
+    /// An axis of whole numbers, without a unit.
+    #[must_use]
+    pub fn whole(label: impl Into<String>) -> Self {
+        Self { is_whole: true, ..Self::new(label, "") }
     }
 
     /// From `least` to `most`.
@@ -203,7 +215,8 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// The least that is shown upwards, where 0 is near enough to be shown as well.
+    /// The least that is shown upwards, where 0 is near enough to be shown as well, or where
+    /// nothing can be below it.
     #[must_use]
     pub fn ground(&self) -> Option<f64> {
         let Content::Series(series) = &self.content else { return None };
@@ -214,7 +227,11 @@ impl Figure {
         };
         let (least, most) =
             (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-        (self.y.range.is_none() && least >= 0.0 && least < 0.7 * most).then_some(0.0)
+        if self.y.range.is_some() {
+            return None;
+        }
+        let floor = self.y.floor.filter(|floor| least < *floor);
+        floor.or_else(|| (least >= 0.0 && least < 0.7 * most).then_some(0.0))
     }
 }
 
@@ -449,6 +466,16 @@ mod tests {
             "series,subject,release_angle_deg,balance_time_s,least,most\n\
              mean,,1,2,,\neach,S01,1,3,,\n"
         );
+    }
+
+    #[test]
+    fn a_spread_goes_no_lower_than_its_axis() {
+        let points = vec![(1.0, 1.0)];
+        let series = Series::new("a", Role::Plain, Mark::Line, points).within(vec![(-0.5, 2.5)]);
+        let Item::Figure(mut figure) = figure(Content::Series(vec![series])) else { return };
+        assert_eq!(figure.ground(), None);
+        figure.y.floor = Some(0.0);
+        assert_eq!(figure.ground(), Some(0.0));
     }
 
     #[test]

@@ -195,7 +195,7 @@ impl<'a> Group<'a> {
         let title = format!("{} of each group", words::heading(&axis.label));
         series.iter().any(|one| !one.points.is_empty()).then(|| Figure {
             caption: self.caption("per-rollout", 31, &title, sentence),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: axis.clone(),
             content: Content::Series(series),
         })
@@ -219,7 +219,7 @@ impl<'a> Group<'a> {
         let title = format!("{} of each group, moving average", words::heading(&axis.label));
         (!series.is_empty()).then(|| Figure {
             caption: self.caption("moving-average", 32, &title, sentence),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: axis,
             content: Content::Series(series),
         })
@@ -273,7 +273,7 @@ impl<'a> Group<'a> {
         }
         (!series.is_empty()).then(|| Figure {
             caption,
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: Axis::new(label, "%").from(0.0, 100.0),
             content: Content::Series(series),
         })

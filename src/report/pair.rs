@@ -59,7 +59,7 @@ fn per_rollout(views: [View<'_>; 2]) -> Option<Figure> {
     let title = format!("{} in each rollout, both modes", words::heading(&axis.label));
     values.iter().all(|values| !values.is_empty()).then(|| Figure {
         caption: caption(views[0], "per-rollout", 14, title, sentence),
-        x: Axis::new("rollout", ""),
+        x: Axis::whole("rollout"),
         y: axis.clone(),
         content: Content::Series(series.collect()),
     })
@@ -86,7 +86,7 @@ fn averages(views: [View<'_>; 2]) -> Option<Figure> {
     });
     Some(Figure {
         caption: caption(views[0], "moving-average", 15, title, sentence),
-        x: Axis::new("rollout", ""),
+        x: Axis::whole("rollout"),
         y: axis,
         content: Content::Series(series.collect()),
     })

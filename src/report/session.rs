@@ -102,8 +102,10 @@ pub const fn subject(mode: Mode, at: usize) -> Mark {
 /// The axis of what `task` is measured by.
 #[must_use]
 pub fn measure(task: &str) -> Axis {
-    let Yardstick { name, unit, range, .. } = yardstick(task);
-    Axis { range, ..Axis::new(name, unit) }
+    let Yardstick { name, unit, range, decimals, .. } = yardstick(task);
+    // Heights lie on both sides of 0; times, speeds and steps do not.
+    let floor = range.is_none().then_some(0.0);
+    Axis { range, floor, is_whole: decimals == 0, ..Axis::new(name, unit) }
 }
 
 /// What each rollout of main of `session` is measured by; those cut before it was known are left
@@ -211,7 +213,7 @@ impl View<'_> {
                     mode = mode.word(),
                 ),
             ),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: axis.clone(),
             content: Content::Series(vec![
                 Series::new(mode.word(), role(*mode), shape(*mode), points.clone()),
@@ -238,7 +240,7 @@ impl View<'_> {
                     with_unit(task, last)
                 ),
             ),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: axis,
             content: Content::Series(vec![Series::new(
                 mode.word(),
@@ -265,7 +267,7 @@ impl View<'_> {
                 "Success",
                 format!("The success at the end of each rollout of main; {last:.0} % at the end."),
             ),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: Axis::new("success", "%").from(0.0, 100.0),
             content: Content::Series(vec![Series::new(
                 mode.word(),
@@ -294,7 +296,7 @@ impl View<'_> {
                      the end."
                 ),
             ),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: Axis::new("person's share w", "%").from(0.0, 100.0),
             content: Content::Series(vec![Series::new(
                 mode.word(),

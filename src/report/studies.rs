@@ -309,7 +309,7 @@ impl<'a> Part<'a> {
         caption.thesis = caption.thesis.replace("like like", "like");
         (!series.is_empty()).then(|| Figure {
             caption,
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: Axis::new(label, "%").from(0.0, 100.0),
             content: Content::Series(series),
         })

@@ -165,7 +165,14 @@ fn bounds(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64) {
 fn axis<'a>(pen: &Pen<'_>, axis: &'a Axis, (least, most): (f64, f64)) -> ChartAxis<'a> {
     let style: Style = pen.style(Role::Dim);
     let labels: Vec<Line<'_>> = if axis.names.is_empty() {
-        [least, f64::midpoint(least, most), most].map(|value| Line::raw(short(value))).to_vec()
+        let middle = f64::midpoint(least, most);
+        if !axis.is_whole {
+            [least, middle, most].map(|value| Line::raw(short(value))).to_vec()
+        } else if middle.fract() == 0.0 {
+            [least, middle, most].map(|value| Line::raw(format!("{value:.0}"))).to_vec()
+        } else {
+            [least, most].map(|value| Line::raw(format!("{value:.0}"))).to_vec()
+        }
     } else {
         let names = axis.names.iter().map(|(_, name)| Line::raw(name.clone()));
         // Labels stand evenly apart: where half a place is left at both ends, so are blanks.
