@@ -30,7 +30,7 @@ pub(super) fn legend(series: &[Series], top: f64) -> (String, f64) {
         // Writing to a text cannot fail.
         let _ = write!(
             svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"{TEXT}\">{label}</text>",
+            "<text class=\"legend\" x=\"{:.1}\" y=\"{:.1}\" font-size=\"{TEXT}\">{label}</text>",
             x + SAMPLE + 8.0,
             y + 4.5
         );
