@@ -24,7 +24,11 @@ pub(super) fn draw(pen: &mut Pen<'_>, figure: &Figure) {
     let axes = format!("   ↑ {}   → {}", figure.y.title(), figure.x.title());
     let after = pen.text(0, 1, &figure.caption.preset, Role::Dim);
     pen.text(after, 1, &axes, Role::Dim);
-    let sentence = wrapped(&figure.caption.sentence, usize::from(width));
+    let mut sentence = figure.caption.sentence.clone();
+    if hides_spread(figure) {
+        sentence.push_str(" The spread is left out here: it is in the file.");
+    }
+    let sentence = wrapped(&sentence, usize::from(width));
     let legend = match &figure.content {
         Content::Series(series) => legend(pen, series),
         Content::Cells(cells) => vec![vec![(scale(cells), Role::Text)]],
@@ -48,6 +52,18 @@ pub(super) fn draw(pen: &mut Pen<'_>, figure: &Figure) {
         pen.text(0, y, &line, Role::Text);
         y += 1;
     }
+}
+
+/// Whether a spread is not drawn.
+fn hides_spread(figure: &Figure) -> bool {
+    let Content::Series(series) = &figure.content else { return false };
+    series.iter().any(|one| one.spread.is_some() && spread_of(one).is_none())
+}
+
+/// The spread of a series that is drawn.
+fn spread_of(series: &Series) -> Option<&Vec<(f64, f64)>> {
+    let is_drawn = |spread: &&Vec<_>| spread.len() == series.points.len();
+    series.spread.as_ref().filter(is_drawn).filter(|spread| spread.len() <= MOST_BARS)
 }
 
 /// What stands for a series: its colour and its sign.
@@ -119,11 +135,8 @@ fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
             };
             drawn.push((role, marker, kind, points));
         }
-        if let Some(spread) = &one.spread
-            && spread.len() == one.points.len()
-            && spread.len() <= MOST_BARS
-        {
-            let ends = one.points.iter().zip(spread);
+        if let Some(spread) = spread_of(one) {
+            let ends = one.points.iter().zip(spread).filter(|(point, _)| point.1.is_finite());
             let ends = ends.flat_map(|((x, _), (a, b))| [(*x, *a), (*x, *b)]).collect();
             drawn.push((Role::Dim, Marker::Dot, GraphType::Scatter, ends));
         }
