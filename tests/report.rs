@@ -61,6 +61,10 @@ fn a_group_becomes_the_figures_of_the_thesis() {
     assert_eq!(report["schema"], 1);
     assert_eq!(report["sessions"].as_array().unwrap().len(), 6);
     assert_eq!(report["left_out"].as_array().unwrap().len(), 0);
+    // The comparisons are there as numbers, too.
+    let comparisons = report["comparisons"].as_array().unwrap();
+    assert_eq!(comparisons.len(), 3, "{comparisons:?}");
+    assert!(comparisons[0]["p"].as_f64().unwrap() > 0.0, "{comparisons:?}");
     let figures = thesis(&report);
     for number in (14..=38).filter(|number| !(10..14).contains(number)) {
         let name = format!("figure {number}");

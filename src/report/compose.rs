@@ -21,8 +21,8 @@ fn kind(session: &Recorded) -> Kind<'_> {
 #[must_use]
 pub fn compose(gathered: &Gathered) -> Report {
     let groups = groups(&gathered.sessions);
-    let mut sections: Vec<Section> =
-        groups.iter().filter(|group| !group.sessions.is_empty()).map(group::section).collect();
+    let full = groups.iter().filter(|group| !group.sessions.is_empty());
+    let (mut sections, comparisons): (Vec<Section>, Vec<_>) = full.map(group::section).unzip();
     sections.extend(gathered.studies.iter().flat_map(studies::sections));
     for group in &groups {
         let view = |session| View { session, preset: &group.preset };
@@ -52,6 +52,7 @@ pub fn compose(gathered: &Gathered) -> Report {
     let mut report = Report {
         title: format!("Report of {}", named.join(" and ")),
         sections,
+        comparisons: comparisons.concat(),
         left_out: gathered.left_out.clone(),
     };
     report.tell_names_apart();

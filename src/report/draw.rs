@@ -28,6 +28,8 @@ const HEIGHT: f64 = 300.0;
 const CELLS_HEIGHT: f64 = 330.0;
 /// Size of all text.
 const TEXT: u32 = 13;
+/// The most ticks of an axis of whole numbers.
+const MOST_TICKS: f64 = 7.0;
 /// Above so many points of a series its spread is a band, not bars.
 const MOST_BARS: usize = 12;
 
@@ -100,7 +102,7 @@ fn colour(role: Role) -> String {
 /// The dashes and the width of a line, in the picture and in its legend.
 const fn dashes(mark: Mark) -> (Option<&'static str>, f64) {
     match mark {
-        Mark::Linked(at) if at % 2 == 1 => (Some("7 4"), 1.6),
+        Mark::DashLinked(_) => (Some("7 4"), 1.6),
         Mark::Line | Mark::Shape(_) => (None, 1.8),
         Mark::Linked(_) => (None, 1.6),
         Mark::Dashed => (Some("7 4"), 1.8),
@@ -162,10 +164,19 @@ fn drawn(figure: &Figure) -> String {
         layout = layout.with_x_axis_min(least).with_x_axis_max(most + beyond);
     }
     if let Some((least, most)) = figure.y.range {
-        layout = layout.with_y_axis_min(least).with_y_axis_max(most);
+        // Room for a line along the upper end.
+        let is_plane = matches!(figure.content, Content::Cells(_));
+        let beyond = if is_plane { 0.0 } else { 0.02 * (most - least) };
+        layout = layout.with_y_axis_min(least).with_y_axis_max(most + beyond);
     }
     if let Some(ground) = figure.ground() {
         layout = layout.with_y_axis_min(ground);
+    }
+    if let Some(step) = whole_step(&figure.x, layout.x_range) {
+        layout = layout.with_x_tick_step(step);
+    }
+    if let Some(step) = whole_step(&figure.y, layout.y_range) {
+        layout = layout.with_y_tick_step(step);
     }
     if !figure.x.names.is_empty() {
         layout = layout.with_x_tick_step(1.0).with_x_tick_format(names(&figure.x));
@@ -185,6 +196,14 @@ fn with_legend(svg: &str, series: &[Series]) -> String {
     taller.replacen("</svg>", &format!("{legend}</svg>"), 1)
 }
 
+/// How far the ticks of an axis of whole numbers are apart: 1, 2 or 5 times a power of ten.
+fn whole_step(axis: &Axis, (least, most): (f64, f64)) -> Option<f64> {
+    let powers = (0..9).map(|power| 10_f64.powi(power));
+    let mut steps = powers.flat_map(|power| [1.0, 2.0, 5.0].map(|step| step * power));
+    let is_wide_enough = |step: &f64| *step * MOST_TICKS >= most - least;
+    steps.find(is_wide_enough).filter(|_| axis.is_whole)
+}
+
 /// Words at the places of the axis that have one.
 fn names(axis: &Axis) -> TickFormat {
     let names = axis.names.clone();
@@ -199,20 +218,19 @@ fn plots(series: &Series) -> Vec<Plot> {
     let (dashes, width) = dashes(series.mark);
     let style = dashes.map_or(LineStyle::Solid, |dashes| LineStyle::Custom(dashes.to_owned()));
     let shape = match series.mark {
-        Mark::Shape(shape) | Mark::Linked(shape) => Some(shape),
+        Mark::Shape(shape) | Mark::Linked(shape) | Mark::DashLinked(shape) => Some(shape),
         _ => None,
     };
     let mut plots = Vec::new();
     if !matches!(series.mark, Mark::Shape(_)) {
-        for piece in series.pieces() {
+        for (piece, spread) in series.pieces_within() {
             let mut line = LinePlot::new()
                 .with_data(piece.iter().copied())
                 .with_color(colour(series.role))
                 .with_stroke_width(width)
                 .with_line_style(style.clone());
-            if let Some(spread) = &series.spread
+            if let Some(spread) = spread
                 && series.points.len() > MOST_BARS
-                && spread.len() == piece.len()
             {
                 line = line
                     .with_band(spread.iter().map(|pair| pair.0), spread.iter().map(|pair| pair.1));
@@ -233,11 +251,10 @@ fn shapes(series: &Series, shape: usize) -> ScatterPlot {
         .with_color(colour(series.role))
         .with_size(if points.len() <= 2 { 5.0 } else { 3.0 })
         .with_marker(marker(shape));
-    if let Some(spread) = &series.spread
-        && spread.len() == points.len()
-        && points.len() <= MOST_BARS
-    {
-        let around = points.iter().zip(spread);
+    let spread: Vec<(f64, f64)> =
+        series.pieces_within().into_iter().filter_map(|piece| piece.1).flatten().copied().collect();
+    if spread.len() == points.len() && series.points.len() <= MOST_BARS {
+        let around = points.iter().zip(&spread);
         let errors: Vec<(f64, f64)> =
             around.map(|((_, y), (least, most))| (y - least, most - y)).collect();
         scatter = scatter.with_y_err_asymmetric(errors);
@@ -370,6 +387,13 @@ mod tests {
         shortened("<path d=\"M 1.25 -3.75L10 2\"/>", &mut out);
         assert_eq!(out, "<path d=\"M 1.2 -3.7L10 2\"/>");
         assert!(trimmed("<svg><text x=\"1.25\">1.25</text></svg>").contains(">1.25<"));
+    }
+
+    #[test]
+    fn counts_have_whole_ticks() {
+        let step = |most: f64| whole_step(&Axis::whole("rollout"), (0.0, most));
+        assert_eq!([3.0, 14.0, 25.0, 100.0].map(step), [1.0, 2.0, 5.0, 20.0].map(Some));
+        assert_eq!(whole_step(&Axis::new("time", "s"), (0.0, 3.0)), None);
     }
 
     #[test]

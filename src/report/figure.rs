@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::statistics::Comparison;
+
 /// What a colour stands for, the same in all figures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -36,6 +38,8 @@ pub enum Mark {
     Shape(usize),
     /// Line and shapes.
     Linked(usize),
+    /// Dashed line and shapes.
+    DashLinked(usize),
 }
 
 /// Some numbers that belong together.
@@ -51,13 +55,16 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
     /// Around each point the least and the most, where there is a spread.
     pub spread: Option<Vec<(f64, f64)>>,
+    /// Whose each point is, where each is a subject's; else nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub subjects: Vec<String>,
 }
 
 impl Series {
     /// A series without spread.
     #[must_use]
     pub fn new(label: impl Into<String>, role: Role, mark: Mark, points: Vec<(f64, f64)>) -> Self {
-        Self { label: label.into(), role, mark, points, spread: None }
+        Self { label: label.into(), role, mark, points, spread: None, subjects: Vec::new() }
     }
 
     /// With this spread around its points.
@@ -66,10 +73,32 @@ impl Series {
         Self { spread: Some(spread), ..self }
     }
 
+    /// With these subjects, one a point.
+    #[must_use]
+    pub fn each_of(self, subjects: Vec<String>) -> Self {
+        Self { subjects, ..self }
+    }
+
     /// The unbroken parts of it.
     pub fn pieces(&self) -> impl Iterator<Item = &[(f64, f64)]> {
         let is_whole = |&(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
         self.points.split(move |point| !is_whole(point)).filter(|piece| !piece.is_empty())
+    }
+
+    /// The unbroken parts of it, each with its part of the spread, where there is one.
+    #[must_use]
+    pub fn pieces_within(&self) -> Vec<(&[(f64, f64)], Option<&[(f64, f64)]>)> {
+        let is_whole = |&(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
+        let mut from = 0;
+        let mut pieces = Vec::new();
+        for piece in self.points.split(|point| !is_whole(point)) {
+            let spread = self.spread.as_ref().and_then(|all| all.get(from..from + piece.len()));
+            from += piece.len() + 1;
+            if !piece.is_empty() {
+                pieces.push((piece, spread));
+            }
+        }
+        pieces
     }
 }
 
@@ -84,6 +113,12 @@ pub struct Axis {
     pub range: Option<(f64, f64)>,
     /// Words in place of numbers.
     pub names: Vec<(f64, String)>,
+    /// Below which nothing can be, such as 0 of times: nothing below is shown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub floor: Option<f64>,
+    /// Whether only whole numbers are on it, as of counts.
+    #[serde(skip)]
+    pub is_whole: bool,
 }
 
 impl Axis {
@@ -91,6 +126,12 @@ impl Axis {
     #[must_use]
     pub fn new(label: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { label: label.into(), unit: unit.into(), ..Self::default() }
+    }
+
+    /// An axis of whole numbers, without a unit.
+    #[must_use]
+    pub fn whole(label: impl Into<String>) -> Self {
+        Self { is_whole: true, ..Self::new(label, "") }
     }
 
     /// From `least` to `most`.
@@ -174,7 +215,8 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// The least that is shown upwards, where 0 is near enough to be shown as well.
+    /// The least that is shown upwards, where 0 is near enough to be shown as well, or where
+    /// nothing can be below it.
     #[must_use]
     pub fn ground(&self) -> Option<f64> {
         let Content::Series(series) = &self.content else { return None };
@@ -185,7 +227,11 @@ impl Figure {
         };
         let (least, most) =
             (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-        (self.y.range.is_none() && least >= 0.0 && least < 0.7 * most).then_some(0.0)
+        if self.y.range.is_some() {
+            return None;
+        }
+        let floor = self.y.floor.filter(|floor| least < *floor);
+        floor.or_else(|| (least >= 0.0 && least < 0.7 * most).then_some(0.0))
     }
 }
 
@@ -253,14 +299,19 @@ impl Figure {
         let (x, y) = (self.x.column(), self.y.column());
         match &self.content {
             Content::Series(series) => {
-                rows.write_record(["series", &x, &y, "least", "most"])?;
+                let has_subjects = series.iter().any(|one| !one.subjects.is_empty());
+                let subject = has_subjects.then_some("subject");
+                let head = ["series"].into_iter().chain(subject);
+                rows.write_record(head.chain([&*x, &*y, "least", "most"]))?;
                 for one in series {
                     for (index, (x, y)) in one.points.iter().enumerate() {
                         let spread = one.spread.as_ref().and_then(|spread| spread.get(index));
                         let (least, most) = spread.map_or((f64::NAN, f64::NAN), |pair| *pair);
                         let cells = [*x, *y, least, most].map(cell);
+                        let subject = one.subjects.get(index).map_or("", String::as_str);
                         rows.write_record(
                             std::iter::once(one.label.as_str())
+                                .chain(has_subjects.then_some(subject))
                                 .chain(cells.iter().map(String::as_str)),
                         )?;
                     }
@@ -319,6 +370,24 @@ pub struct Section {
     pub items: Vec<Item>,
 }
 
+/// A comparison of two modes, in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Contrast {
+    /// Task and preset.
+    pub preset: String,
+    /// What is compared,
+    pub measure: String,
+    /// and its unit; empty where it has none.
+    pub unit: &'static str,
+    /// The modes: the first is compared with the second.
+    pub of: [&'static str; 2],
+    /// What tells which values belong together; none where they are of groups of their own.
+    pub paired_by: Option<&'static str>,
+    /// What came of it.
+    #[serde(flatten)]
+    pub comparison: Comparison,
+}
+
 /// Something that is not in the report, and why.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct LeftOut {
@@ -335,6 +404,8 @@ pub struct Report {
     pub title: String,
     /// Its parts.
     pub sections: Vec<Section>,
+    /// Its comparisons of modes.
+    pub comparisons: Vec<Contrast>,
     /// What is not in it.
     pub left_out: Vec<LeftOut>,
 }
@@ -386,6 +457,28 @@ mod tests {
     }
 
     #[test]
+    fn the_data_file_names_the_subjects_of_points() {
+        let mean = Series::new("mean", Role::Plain, Mark::Shape(0), vec![(1.0, 2.0)]);
+        let each = Series::new("each", Role::Plain, Mark::Shape(0), vec![(1.0, 3.0)]);
+        let item = figure(Content::Series(vec![mean, each.each_of(vec!["S01".to_owned()])]));
+        assert_eq!(
+            item.csv(),
+            "series,subject,release_angle_deg,balance_time_s,least,most\n\
+             mean,,1,2,,\neach,S01,1,3,,\n"
+        );
+    }
+
+    #[test]
+    fn a_spread_goes_no_lower_than_its_axis() {
+        let points = vec![(1.0, 1.0)];
+        let series = Series::new("a", Role::Plain, Mark::Line, points).within(vec![(-0.5, 2.5)]);
+        let Item::Figure(mut figure) = figure(Content::Series(vec![series])) else { return };
+        assert_eq!(figure.ground(), None);
+        figure.y.floor = Some(0.0);
+        assert_eq!(figure.ground(), Some(0.0));
+    }
+
+    #[test]
     fn cells_stand_at_their_middles() {
         let cells =
             Cells { rows: vec![vec![1.0, 2.0]], label: "value".to_owned(), diverging: false };
@@ -398,6 +491,10 @@ mod tests {
         let points = vec![(0.0, 1.0), (1.0, 2.0), (f64::NAN, 0.0), (2.0, 3.0)];
         let series = Series::new("a", Role::Plain, Mark::Line, points);
         assert_eq!(series.pieces().map(<[_]>::len).collect::<Vec<_>>(), [2, 1]);
+        let spread: Vec<(f64, f64)> = (0..4).map(|at| (f64::from(at), 9.0)).collect();
+        let series = series.within(spread.clone());
+        let pieces = series.pieces_within();
+        assert_eq!((pieces[0].1, pieces[1].1), (Some(&spread[..2]), Some(&spread[3..])));
     }
 
     #[test]

@@ -9,11 +9,15 @@ mod tables;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::achieved::{Achieved, yardstick};
-use super::figure::{Axis, Caption, Content, Figure, Item, Mark, Role, Section, Series, real};
+use super::figure::{
+    Axis, Caption, Content, Contrast, Figure, Item, Mark, Role, Section, Series, real,
+};
 use super::gather::Recorded;
 use super::metrics::{deviation, mean};
-use super::series::{WINDOW, moving_average, over_rows};
-use super::session::{line, measure, measured, numbered, role, with_unit};
+use super::series::{ByRollout, WINDOW, along, moving_average, numbers, over_rows, with_gaps};
+use super::session::{
+    line, linked, measure, measured, numbered, of_main, role, shape, subject, with_unit,
+};
 use super::words;
 use crate::record::EpisodeRow;
 use crate::session::Phase;
@@ -53,10 +57,10 @@ impl Subject<'_> {
         (!values.is_empty()).then(|| mean(&values))
     }
 
-    /// The mean over its sessions of a list that each has, place by place.
-    fn mean_row(&self, of: impl Fn(&Recorded) -> Vec<f64>) -> Vec<f64> {
-        let rows: Vec<Vec<f64>> = self.sessions.iter().map(|session| of(session)).collect();
-        over_rows(&rows).into_iter().map(|(_, mean, ..)| mean).collect()
+    /// The mean over its sessions of numbers that each has, rollout by rollout.
+    fn mean_row(&self, of: impl Fn(&Recorded) -> ByRollout) -> ByRollout {
+        let rows: Vec<ByRollout> = self.sessions.iter().map(|session| of(session)).collect();
+        over_rows(&rows).into_iter().map(|(rollout, (mean, _))| (rollout, mean)).collect()
     }
 }
 
@@ -66,9 +70,11 @@ fn average(session: &Recorded, phase: Phase) -> Option<f64> {
     if rows.is_empty() { None } else { Achieved::of(&session.task, &rows).mean() }
 }
 
-/// What each rollout of main is measured by.
-fn curve(session: &Recorded) -> Vec<f64> {
-    measured(&session.task, &session.of_phase(Phase::Main))
+/// What the last rollouts of main are measured by, on average.
+fn last_average(session: &Recorded) -> Option<f64> {
+    let values = numbers(&measured(session));
+    let last = &values[values.len().saturating_sub(WINDOW)..];
+    (!last.is_empty()).then(|| mean(last))
 }
 
 /// What the policy of each tenth is measured by alone: percent and mean.
@@ -83,9 +89,9 @@ fn tenths(session: &Recorded) -> BTreeMap<u8, f64> {
     rows.into_iter().filter_map(mean_of).collect()
 }
 
-/// The part of a report that shows `group`.
+/// The part of a report that shows `group`, and its comparisons.
 #[must_use]
-pub fn section(group: &Group<'_>) -> Section {
+pub fn section(group: &Group<'_>) -> (Section, Vec<Contrast>) {
     let mut items = Vec::new();
     let comparison = compared::table(group);
     items.extend(comparison.table.map(Item::Table));
@@ -112,7 +118,8 @@ pub fn section(group: &Group<'_>) -> Section {
     items.extend(figures.map(Item::Figure));
     let mut notes = group.notes();
     notes.extend(comparison.sentences);
-    Section { title: format!("Group: {}", group.preset), notes, items }
+    let title = format!("Group: {}", group.preset);
+    (Section { title, notes, items }, comparison.contrasts)
 }
 
 impl<'a> Group<'a> {
@@ -171,10 +178,12 @@ impl<'a> Group<'a> {
         let axis = measure(self.task);
         let mut series = Vec::new();
         for (mode, arm) in self.arms() {
-            let curves: Vec<Vec<f64>> = arm.iter().map(|one| one.mean_row(curve)).collect();
+            let curves: Vec<ByRollout> = arm.iter().map(|one| one.mean_row(measured)).collect();
             let rows = over_rows(&curves);
-            let points = rows.iter().map(|row| (real(row.0), row.1)).collect();
-            let band = rows.iter().map(|row| (row.1 - row.2, row.1 + row.2)).collect();
+            let rows = with_gaps(&rows).into_iter();
+            let rows = rows.map(|(at, row)| (at, row.copied().unwrap_or((f64::NAN, f64::NAN))));
+            let (points, band) =
+                rows.map(|(at, (mean, sd))| ((at, mean), (mean - sd, mean + sd))).unzip();
             series.push(Series::new(mode.word(), role(mode), line(mode), points).within(band));
         }
         let sentence = format!(
@@ -186,7 +195,7 @@ impl<'a> Group<'a> {
         let title = format!("{} of each group", words::heading(&axis.label));
         series.iter().any(|one| !one.points.is_empty()).then(|| Figure {
             caption: self.caption("per-rollout", 31, &title, sentence),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: axis.clone(),
             content: Content::Series(series),
         })
@@ -196,10 +205,9 @@ impl<'a> Group<'a> {
         let axis = measure(self.task);
         let mut series = Vec::new();
         for (mode, arm) in self.arms() {
-            let curves: Vec<Vec<f64>> = arm.iter().map(|one| one.mean_row(curve)).collect();
-            let means: Vec<f64> = over_rows(&curves).into_iter().map(|row| row.1).collect();
-            let averages = moving_average(&means, WINDOW);
-            let points = averages.into_iter().map(|(at, value)| (real(at), value)).collect();
+            let curves: Vec<ByRollout> = arm.iter().map(|one| one.mean_row(measured)).collect();
+            let means = over_rows(&curves).into_iter().map(|(rollout, row)| (rollout, row.0));
+            let points = along(&moving_average(&means.collect(), WINDOW));
             series.push(Series::new(mode.word(), role(mode), line(mode), points));
         }
         series.retain(|one| !one.points.is_empty());
@@ -211,7 +219,7 @@ impl<'a> Group<'a> {
         let title = format!("{} of each group, moving average", words::heading(&axis.label));
         (!series.is_empty()).then(|| Figure {
             caption: self.caption("moving-average", 32, &title, sentence),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: axis,
             content: Content::Series(series),
         })
@@ -235,12 +243,8 @@ impl<'a> Group<'a> {
         let arm = self.arm(mode);
         let mut series = Vec::new();
         for (at, subject) in arm.iter().enumerate() {
-            // All rollouts, so that places are rollouts: what is not known yet is a break.
-            let row = subject.mean_row(|session| {
-                let rows = session.of_phase(Phase::Main);
-                rows.iter().map(|row| of(row).map_or(f64::NAN, |value| 100.0 * value)).collect()
-            });
-            let points = row.iter().enumerate().map(|(n, value)| (real(n + 1), *value)).collect();
+            let percent = |row: &EpisodeRow| of(row).map(|value| 100.0 * value);
+            let points = along(&subject.mean_row(|session| of_main(session, percent)));
             let mark = match at % 3 {
                 0 => Mark::Line,
                 1 => Mark::Dashed,
@@ -269,7 +273,7 @@ impl<'a> Group<'a> {
         }
         (!series.is_empty()).then(|| Figure {
             caption,
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: Axis::new(label, "%").from(0.0, 100.0),
             content: Content::Series(series),
         })
@@ -290,8 +294,8 @@ impl<'a> Group<'a> {
     fn autonomous(&self) -> Option<Figure> {
         let axis = measure(self.task);
         let (mut series, mut names, mut told) = (Vec::new(), Vec::new(), Vec::new());
-        for (at, (mode, subjects)) in self.alone().into_iter().enumerate() {
-            let place = real(at + 1);
+        for (place, (mode, subjects)) in (1_u8..).zip(self.alone()) {
+            let place = f64::from(place);
             let values: Vec<f64> = subjects.iter().map(|(_, value)| *value).collect();
             let (mean, sd) = (mean(&values), deviation(&values));
             let spread = sd.unwrap_or(0.0);
@@ -299,14 +303,15 @@ impl<'a> Group<'a> {
                 Series::new(
                     format!("{}, mean ± sd", mode.word()),
                     role(mode),
-                    Mark::Shape(at),
+                    shape(mode),
                     vec![(place, mean)],
                 )
                 .within(vec![(mean - spread, mean + spread)]),
             );
             let beside = values.iter().map(|value| (place + 0.25, *value)).collect();
             let label = format!("{}, each subject", mode.word());
-            series.push(Series::new(label, role(mode), Mark::Shape(at + 3), beside));
+            let who = subjects.iter().map(|(name, _)| (*name).to_owned()).collect();
+            series.push(Series::new(label, role(mode), shape(mode), beside).each_of(who));
             names.push((place, mode.word().to_owned()));
             let sd = sd.map_or(String::new(), |sd| format!(" ± {}", with_unit(self.task, sd)));
             let n = words::counted(values.len(), "subject");
@@ -333,14 +338,16 @@ impl<'a> Group<'a> {
         let better_is_more = yardstick(self.task).more_is_better;
         let mut series = Vec::new();
         let mut longest = 0;
-        for (at, (mode, subjects)) in self.alone().into_iter().enumerate() {
-            let mut values: Vec<f64> = subjects.iter().map(|(_, value)| *value).collect();
-            values.sort_by(f64::total_cmp);
+        for (mode, mut subjects) in self.alone() {
+            subjects.sort_by(|a, b| a.1.total_cmp(&b.1));
             if !better_is_more {
-                values.reverse();
+                subjects.reverse();
             }
-            longest = longest.max(values.len());
-            series.push(Series::new(mode.word(), role(mode), Mark::Linked(at), numbered(&values)));
+            longest = longest.max(subjects.len());
+            let (who, values): (Vec<String>, Vec<f64>) =
+                subjects.into_iter().map(|(name, value)| (name.to_owned(), value)).unzip();
+            let sorted = Series::new(mode.word(), role(mode), linked(mode), numbered(&values));
+            series.push(sorted.each_of(who));
         }
         let zero: Vec<f64> = self
             .sessions
@@ -349,12 +356,17 @@ impl<'a> Group<'a> {
             .collect();
         if !zero.is_empty() {
             let ends = vec![(1.0, mean(&zero)), (real(longest.max(2)), mean(&zero))];
-            series.push(Series::new("zero control", Role::Plain, Mark::Dashed, ends));
+            series.push(Series::new("zero control", Role::Plain, Mark::Dotted, ends));
         }
+        let nobody = if zero.is_empty() {
+            ""
+        } else {
+            "; the dotted line is what nobody at the controls comes to"
+        };
         let number = if self.task == SwingUp::NAME { 10 } else { 36 };
         let sentence = format!(
             "The {} of each subject's final policy alone, the subjects of each group sorted \
-             from the worst to the best; the dashed line is what nobody at the controls comes to.",
+             from the worst to the best{nobody}.",
             words::mean_of(&axis.label)
         );
         let title = format!("{} of the robot alone, subjects sorted", words::heading(&axis.label));
@@ -401,12 +413,12 @@ impl<'a> Group<'a> {
                 let points = tenths.into_iter().map(|(percent, v)| (f64::from(percent), v));
                 let label = format!("{name} ({})", mode.word());
                 let role = role(mode);
-                series.push(Series::new(label, role, Mark::Linked(at), points.collect()));
+                series.push(Series::new(label, role, subject(mode, at), points.collect()));
             }
         }
         let sentence = format!(
-            "The {} of each subject's robot alone after each tenth of main; colours tell the \
-             groups apart, shapes the subjects.",
+            "The {} of each subject's robot alone after each tenth of main; colours and lines \
+             tell the groups apart, shapes the subjects.",
             words::mean_of(&axis.label)
         );
         let title = format!("{} of the robot alone after each tenth", words::heading(&axis.label));
@@ -445,8 +457,7 @@ impl<'a> Group<'a> {
                     if by_ratio { format!("{last:.0} %") } else { with_unit(self.task, *last) };
                 told.push(format!("{} {last}", mode.word()));
             }
-            let at = usize::from(mode == Mode::Sequential);
-            series.push(Series::new(mode.word(), role(mode), Mark::Linked(at), points));
+            series.push(Series::new(mode.word(), role(mode), linked(mode), points));
         }
         let sentence = format!(
             "How much better the mean of each group's robots alone is than after the first tenth \

@@ -107,8 +107,8 @@ fn write_figure(page: &mut String, item: &Item, figure: &Figure) -> std::fmt::Re
     page.push_str(&draw::for_page(figure));
     writeln!(
         page,
-        "<figcaption>{} <span class=\"data\">Data: <code>{}</code> \
-         <button data-save=\"{name}\">save SVG</button></span></figcaption></figure>",
+        "<figcaption>{} <span class=\"data\">Data: <code>{}</code>, \
+         which <code>--csv DIR</code> writes. <button data-save=\"{name}\">save SVG</button></span></figcaption></figure>",
         escaped(&figure.caption.sentence),
         escaped(&item.data_file()),
     )
@@ -136,8 +136,8 @@ fn write_table(page: &mut String, item: &Item, table: &Table) -> std::fmt::Resul
     }
     writeln!(
         page,
-        "</tbody></table></div><figcaption>{} <span class=\"data\">Data: <code>{}</code></span>\
-         </figcaption></figure>",
+        "</tbody></table></div><figcaption>{} <span class=\"data\">Data: <code>{}</code>, \
+         which <code>--csv DIR</code> writes.</span></figcaption></figure>",
         escaped(&table.caption.sentence),
         escaped(&item.data_file())
     )
@@ -195,6 +195,7 @@ mod tests {
                 notes: vec!["A note.".to_owned()],
                 items: vec![Item::Figure(figure), Item::Table(table)],
             }],
+            comparisons: vec![],
             left_out: vec![LeftOut { path: "logs/x".to_owned(), why: "it is empty".to_owned() }],
         }
     }
@@ -209,6 +210,7 @@ mod tests {
             "What it shows.",
             "a.csv",
             "b.csv",
+            "--csv DIR",
             "time (s)",
             "&lt;S01&gt;",
             "logs/x",

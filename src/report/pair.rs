@@ -1,10 +1,10 @@
 //! A subject who took part in both modes: figures 14, 15, 20 and 23, both overlaid.
 
-use super::figure::{Axis, Caption, Content, Figure, Item, Section, Series, real};
+use super::figure::{Axis, Caption, Content, Figure, Item, Mark, Section, Series};
 use super::metrics::mean;
-use super::series::{NEIGHBOURS, WINDOW, average_around, moving_average};
+use super::series::{NEIGHBOURS, WINDOW, along, average_around, moving_average, numbers};
 use super::session::{
-    View, by_start, level, line, measure, measured, numbered, role, shape, starts_differ, with_unit,
+    View, by_start, level, line, measure, measured, role, shape, starts_differ, with_unit,
 };
 use super::words;
 use crate::session::Phase;
@@ -44,12 +44,12 @@ fn caption(view: View<'_>, name: &str, number: u32, title: String, sentence: Str
 
 fn per_rollout(views: [View<'_>; 2]) -> Option<Figure> {
     let task = &views[0].session.task;
-    let values = views.map(|view| measured(task, &view.session.of_phase(Phase::Main)));
+    let values = views.map(|view| measured(view.session));
     let axis = measure(task);
-    let means = values.each_ref().map(|values| with_unit(task, mean(values)));
+    let means = values.each_ref().map(|values| with_unit(task, mean(&numbers(values))));
     let series = views.iter().zip(&values).map(|(view, values)| {
         let mode = view.session.mode;
-        Series::new(mode.word(), role(mode), shape(mode), numbered(values))
+        Series::new(mode.word(), role(mode), shape(mode), along(values))
     });
     let sentence = format!(
         "The {} of each rollout in both modes: on average {} in sequential and {} in simultaneous \
@@ -59,7 +59,7 @@ fn per_rollout(views: [View<'_>; 2]) -> Option<Figure> {
     let title = format!("{} in each rollout, both modes", words::heading(&axis.label));
     values.iter().all(|values| !values.is_empty()).then(|| Figure {
         caption: caption(views[0], "per-rollout", 14, title, sentence),
-        x: Axis::new("rollout", ""),
+        x: Axis::whole("rollout"),
         y: axis.clone(),
         content: Content::Series(series.collect()),
     })
@@ -67,9 +67,9 @@ fn per_rollout(views: [View<'_>; 2]) -> Option<Figure> {
 
 fn averages(views: [View<'_>; 2]) -> Option<Figure> {
     let task = &views[0].session.task;
-    let values = views.map(|view| measured(task, &view.session.of_phase(Phase::Main)));
+    let values = views.map(|view| measured(view.session));
     let averages = values.map(|values| moving_average(&values, WINDOW));
-    let last = averages.each_ref().map(|points| points.last().map(|(_, value)| *value));
+    let last = averages.each_ref().map(|points| points.last_key_value().map(|(_, value)| *value));
     let [sequential, simultaneous] = last;
     let axis = measure(task);
     let sentence = format!(
@@ -82,12 +82,11 @@ fn averages(views: [View<'_>; 2]) -> Option<Figure> {
     let title = format!("{}, moving average, both modes", words::heading(&axis.label));
     let series = views.iter().zip(&averages).map(|(view, points)| {
         let mode = view.session.mode;
-        let points = points.iter().map(|(at, value)| (real(*at), *value)).collect();
-        Series::new(mode.word(), role(mode), line(mode), points)
+        Series::new(mode.word(), role(mode), line(mode), along(points))
     });
     Some(Figure {
         caption: caption(views[0], "moving-average", 15, title, sentence),
-        x: Axis::new("rollout", ""),
+        x: Axis::whole("rollout"),
         y: axis,
         content: Content::Series(series.collect()),
     })
@@ -108,7 +107,8 @@ fn around_starts(views: [View<'_>; 2], phase: Phase) -> Option<Figure> {
         let around = average_around(points, NEIGHBOURS);
         series.push(Series::new(mode.word(), role(mode), line(mode), around));
         let label = format!("mean, {}", mode.word());
-        series.push(Series { role: role(mode), ..level(&label, average, points) });
+        let mean = level(&label, average, points);
+        series.push(Series { role: role(mode), mark: Mark::Dotted, ..mean });
     }
     let (name, number, who) = if phase == Phase::Main {
         ("by-start", 20, "while teaching")

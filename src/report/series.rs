@@ -1,18 +1,58 @@
 //! What the thesis does with series of numbers: averages along them.
 
-use super::metrics::mean;
+use std::collections::BTreeMap;
+
+use super::metrics::{deviation, mean};
+
+/// A number of each rollout, by the rollout's own number: what is missing has none.
+pub type ByRollout = BTreeMap<u32, f64>;
 
 /// The window of figures 15 and 32, rollouts.
 pub const WINDOW: usize = 10;
 /// The neighbours of figures 18 to 23, the point itself among them.
 pub const NEIGHBOURS: usize = 9;
 
-/// At each of `values` from the `window`-th on, the mean of it and those before it: as many as a
-/// moving average of that window has. Where there are fewer, nothing.
+/// The numbers, in the order of the rollouts.
 #[must_use]
-pub fn moving_average(values: &[f64], window: usize) -> Vec<(usize, f64)> {
-    let means = values.windows(window.max(1)).map(mean);
-    (window.max(1)..).zip(means).collect()
+pub fn numbers(values: &ByRollout) -> Vec<f64> {
+    values.values().copied().collect()
+}
+
+/// The rollouts in order; where some are missing, one of them, with nothing.
+#[must_use]
+pub fn with_gaps<T>(values: &BTreeMap<u32, T>) -> Vec<(f64, Option<&T>)> {
+    let mut all = Vec::new();
+    let mut next = None;
+    for (&rollout, value) in values {
+        if let Some(missing) = next
+            && missing < rollout
+        {
+            all.push((f64::from(missing), None));
+        }
+        all.push((f64::from(rollout), Some(value)));
+        next = rollout.checked_add(1);
+    }
+    all
+}
+
+/// The points of a line along the rollouts, which breaks where some are missing.
+#[must_use]
+pub fn along(values: &ByRollout) -> Vec<(f64, f64)> {
+    let all = with_gaps(values).into_iter();
+    all.map(|(rollout, value)| (rollout, value.copied().unwrap_or(f64::NAN))).collect()
+}
+
+/// At each rollout from the `window`-th on, the mean of it and those before it: as many as a
+/// moving average of that window has, missing ones passed over. Where there are fewer, nothing.
+#[must_use]
+pub fn moving_average(values: &ByRollout, window: usize) -> ByRollout {
+    let known: Vec<(u32, f64)> = values.iter().map(|(rollout, v)| (*rollout, *v)).collect();
+    let windows = known.windows(window.max(1));
+    let means = windows.filter_map(|part| {
+        let numbers: Vec<f64> = part.iter().map(|(_, value)| *value).collect();
+        Some((part.last()?.0, mean(&numbers)))
+    });
+    means.collect()
 }
 
 /// At each point the mean of the values around it, `neighbours` together, fewer at the borders;
@@ -46,18 +86,16 @@ pub fn extent(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     (least <= most).then_some((least, most))
 }
 
-/// Mean and standard deviation of each place of several rows, over those that reach so far: the
-/// place, from 1, the mean, the deviation (0 of a single one), and how many there are.
+/// Mean and standard deviation (0 of a single one) of each rollout of several rows, over those that
+/// have it.
 #[must_use]
-pub fn over_rows(rows: &[Vec<f64>]) -> Vec<(usize, f64, f64, usize)> {
-    let longest = rows.iter().map(Vec::len).max().unwrap_or(0);
-    (0..longest)
-        .map(|place| {
-            let values: Vec<f64> = rows.iter().filter_map(|row| row.get(place)).copied().collect();
-            let spread = super::metrics::deviation(&values).unwrap_or(0.0);
-            (place + 1, mean(&values), spread, values.len())
-        })
-        .collect()
+pub fn over_rows(rows: &[ByRollout]) -> BTreeMap<u32, (f64, f64)> {
+    let mut rollouts: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+    for (rollout, value) in rows.iter().flatten() {
+        rollouts.entry(*rollout).or_default().push(*value);
+    }
+    let spread = |values: &[f64]| deviation(values).unwrap_or(0.0);
+    rollouts.into_iter().map(|(rollout, v)| (rollout, (mean(&v), spread(&v)))).collect()
 }
 
 #[cfg(test)]
@@ -66,8 +104,16 @@ mod tests {
 
     #[test]
     fn a_moving_average_begins_when_its_window_is_full() {
-        assert_eq!(moving_average(&[1.0, 2.0, 6.0, 4.0], 3), [(3, 3.0), (4, 4.0)]);
-        assert_eq!(moving_average(&[1.0], 3), []);
+        let values = ByRollout::from([(1, 1.0), (2, 2.0), (3, 6.0), (5, 4.0)]);
+        assert_eq!(moving_average(&values, 3), ByRollout::from([(3, 3.0), (5, 4.0)]));
+        assert_eq!(moving_average(&ByRollout::from([(1, 1.0)]), 3), ByRollout::new());
+    }
+
+    #[test]
+    fn a_line_breaks_where_rollouts_are_missing() {
+        let points = along(&ByRollout::from([(2, 1.0), (3, 2.0), (6, 3.0)]));
+        assert_eq!(points.iter().map(|point| point.0).collect::<Vec<_>>(), [2.0, 3.0, 4.0, 6.0]);
+        assert!(points[2].1.is_nan() && points[3].1 == 3.0, "{points:?}");
     }
 
     #[test]
@@ -77,10 +123,11 @@ mod tests {
     }
 
     #[test]
-    fn rows_end_when_they_end() {
-        let rows = over_rows(&[vec![1.0, 5.0], vec![3.0]]);
-        assert_eq!((rows[0].1, rows[0].3), (2.0, 2));
-        assert!((rows[0].2 - 2.0_f64.sqrt()).abs() < 1e-12);
-        assert_eq!(rows[1], (2, 5.0, 0.0, 1));
+    fn rows_are_averaged_by_their_rollouts() {
+        let rows = [ByRollout::from([(1, 1.0), (3, 5.0)]), ByRollout::from([(1, 3.0), (2, 7.0)])];
+        let over = over_rows(&rows);
+        assert_eq!(over[&1].0, 2.0);
+        assert!((over[&1].1 - 2.0_f64.sqrt()).abs() < 1e-12);
+        assert_eq!((over[&2], over[&3]), ((7.0, 0.0), (5.0, 0.0)));
     }
 }

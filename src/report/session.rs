@@ -4,7 +4,9 @@ use super::achieved::{Yardstick, yardstick};
 use super::figure::{Axis, Caption, Content, Figure, Item, Mark, Role, Section, Series, real};
 use super::gather::{Moment, Recorded};
 use super::metrics::mean;
-use super::series::{NEIGHBOURS, WINDOW, average_around, by_x, extent, moving_average};
+use super::series::{
+    ByRollout, NEIGHBOURS, WINDOW, along, average_around, by_x, extent, moving_average, numbers,
+};
 use super::{portrait, words};
 use crate::record::{EpisodeRow, Status};
 use crate::session::Phase;
@@ -79,17 +81,45 @@ pub const fn shape(mode: Mode) -> Mark {
     }
 }
 
+/// The line and the shape of `mode`.
+#[must_use]
+pub const fn linked(mode: Mode) -> Mark {
+    match mode {
+        Mode::Simultaneous => Mark::Linked(0),
+        Mode::Sequential => Mark::DashLinked(1),
+    }
+}
+
+/// The line of `mode` with the shape of one subject, the `at`-th of its group.
+#[must_use]
+pub const fn subject(mode: Mode, at: usize) -> Mark {
+    match mode {
+        Mode::Simultaneous => Mark::Linked(at),
+        Mode::Sequential => Mark::DashLinked(at),
+    }
+}
+
 /// The axis of what `task` is measured by.
 #[must_use]
 pub fn measure(task: &str) -> Axis {
-    let Yardstick { name, unit, range, .. } = yardstick(task);
-    Axis { range, ..Axis::new(name, unit) }
+    let Yardstick { name, unit, range, decimals, .. } = yardstick(task);
+    // Heights lie on both sides of 0; times, speeds and steps do not.
+    let floor = range.is_none().then_some(0.0);
+    Axis { range, floor, is_whole: decimals == 0, ..Axis::new(name, unit) }
 }
 
-/// What the `rows` are measured by, in order; those cut before it was known are left out.
+/// What each rollout of main of `session` is measured by; those cut before it was known are left
+/// out.
 #[must_use]
-pub fn measured(task: &str, rows: &[&EpisodeRow]) -> Vec<f64> {
-    rows.iter().filter_map(|row| (yardstick(task).of)(row)).collect()
+pub fn measured(session: &Recorded) -> ByRollout {
+    of_main(session, yardstick(&session.task).of)
+}
+
+/// A number of each rollout of main of `session`, where it is known.
+#[must_use]
+pub fn of_main(session: &Recorded, of: impl Fn(&EpisodeRow) -> Option<f64>) -> ByRollout {
+    let rows = session.of_phase(Phase::Main);
+    rows.into_iter().filter_map(|row| Some((row.episode, of(row)?))).collect()
 }
 
 /// What the `rows` are measured by, against where they started, in the units of figures.
@@ -110,7 +140,7 @@ pub fn starts_differ(points: &[(f64, f64)]) -> bool {
     places.len() > NEIGHBOURS
 }
 
-/// Numbers by their rollout, from 1.
+/// Numbers by their place, from 1.
 #[must_use]
 pub fn numbered(values: &[f64]) -> Vec<(f64, f64)> {
     values.iter().enumerate().map(|(at, value)| (real(at + 1), *value)).collect()
@@ -167,8 +197,8 @@ impl View<'_> {
 
     fn per_rollout(&self) -> Option<Figure> {
         let Recorded { task, mode, .. } = self.session;
-        let values = measured(task, &self.session.of_phase(Phase::Main));
-        let average = mean(&values);
+        let values = measured(self.session);
+        let (average, points) = (mean(&numbers(&values)), along(&values));
         let axis = measure(task);
         (!values.is_empty()).then(|| Figure {
             caption: self.caption(
@@ -183,21 +213,19 @@ impl View<'_> {
                     mode = mode.word(),
                 ),
             ),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: axis.clone(),
             content: Content::Series(vec![
-                Series::new(mode.word(), role(*mode), shape(*mode), numbered(&values)),
-                level("mean", average, &numbered(&values)),
+                Series::new(mode.word(), role(*mode), shape(*mode), points.clone()),
+                level("mean", average, &points),
             ]),
         })
     }
 
     fn moving_average(&self) -> Option<Figure> {
         let Recorded { task, mode, .. } = self.session;
-        let values = measured(task, &self.session.of_phase(Phase::Main));
-        let averages = moving_average(&values, WINDOW);
-        let (first, last) = (averages.first()?.1, averages.last()?.1);
-        let points = averages.iter().map(|(at, value)| (real(*at), *value)).collect();
+        let averages = moving_average(&measured(self.session), WINDOW);
+        let (first, last) = (*averages.first_key_value()?.1, *averages.last_key_value()?.1);
         let axis = measure(task);
         Some(Figure {
             caption: self.caption(
@@ -212,22 +240,20 @@ impl View<'_> {
                     with_unit(task, last)
                 ),
             ),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: axis,
             content: Content::Series(vec![Series::new(
                 mode.word(),
                 role(*mode),
                 line(*mode),
-                points,
+                along(&averages),
             )]),
         })
     }
 
     /// A number at each rollout's end, in percent.
     fn at_ends(&self, of: impl Fn(&EpisodeRow) -> Option<f64>) -> Vec<(f64, f64)> {
-        let rows = self.session.of_phase(Phase::Main);
-        let known = rows.iter().enumerate();
-        known.filter_map(|(at, row)| Some((real(at + 1), 100.0 * of(row)?))).collect()
+        along(&of_main(self.session, |row| of(row).map(|value| 100.0 * value)))
     }
 
     fn success(&self) -> Option<Figure> {
@@ -241,7 +267,7 @@ impl View<'_> {
                 "Success",
                 format!("The success at the end of each rollout of main; {last:.0} % at the end."),
             ),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: Axis::new("success", "%").from(0.0, 100.0),
             content: Content::Series(vec![Series::new(
                 mode.word(),
@@ -270,7 +296,7 @@ impl View<'_> {
                      the end."
                 ),
             ),
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: Axis::new("person's share w", "%").from(0.0, 100.0),
             content: Content::Series(vec![Series::new(
                 mode.word(),

@@ -179,11 +179,16 @@ impl<'a> Part<'a> {
                 spread.push((row.mean - error, row.mean + error));
             }
             let label = format!("{arm}, {readout}");
-            series.push(Series::new(label, role(arm, at), Mark::Linked(at), points).within(spread));
+            let mark = if is_dashed(arm, at) { Mark::DashLinked(at) } else { Mark::Linked(at) };
+            series.push(Series::new(label, role(arm, at), mark, points).within(spread));
         }
         for (at, row) in rows.iter().filter(|row| row.arm == "reference").enumerate() {
             let ends = vec![(10.0, row.mean), (100.0, row.mean)];
-            let mark = if at % 2 == 0 { Mark::Dashed } else { Mark::Dotted };
+            let mark = match &*row.readout {
+                "zero" => Mark::Dotted,
+                _ if at % 2 == 0 => Mark::Dashed,
+                _ => Mark::Thin,
+            };
             series.push(Series::new(&*row.readout, Role::Plain, mark, ends));
         }
         series.retain(|one| !one.points.is_empty());
@@ -293,7 +298,7 @@ impl<'a> Part<'a> {
                     points.push((f64::from(episode), mean));
                     spread.push((mean - sd, mean + sd));
                 }
-                let mark = if at % 2 == 0 { Mark::Dashed } else { Mark::Line };
+                let mark = if is_dashed(arm, at) { Mark::Dashed } else { Mark::Line };
                 Series::new(arm, role(arm, at), mark, points).within(spread)
             });
             let sentence =
@@ -304,7 +309,7 @@ impl<'a> Part<'a> {
         caption.thesis = caption.thesis.replace("like like", "like");
         (!series.is_empty()).then(|| Figure {
             caption,
-            x: Axis::new("rollout", ""),
+            x: Axis::whole("rollout"),
             y: Axis::new(label, "%").from(0.0, 100.0),
             content: Content::Series(series),
         })
@@ -317,6 +322,15 @@ fn role(arm: &str, at: usize) -> Role {
         "simultaneous" if at < 2 => Role::Simultaneous,
         "sequential" if at < 2 => Role::Sequential,
         _ => Role::One(at),
+    }
+}
+
+/// Whether the lines of `arm`, the `at`-th of those shown, are dashed: those of a mode as everywhere.
+fn is_dashed(arm: &str, at: usize) -> bool {
+    match arm {
+        "simultaneous" => false,
+        "sequential" => true,
+        _ => at % 2 == 1,
     }
 }
 

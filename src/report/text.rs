@@ -38,7 +38,7 @@ pub fn of_item(item: &Item) -> Vec<String> {
         Item::Figure(figure) => of_figure(figure),
         Item::Table(table) => columns(table),
     });
-    lines.push(format!("  data: {}", item.data_file()));
+    lines.push(format!("  data: {}, which --csv DIR writes", item.data_file()));
     lines
 }
 

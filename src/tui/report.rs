@@ -186,7 +186,8 @@ fn draw_page(pen: &mut Pen<'_>, pages: &mut Pages) {
     }
     match &pages.message {
         Some(message) => {
-            pen.text(1, height - 1, message, Role::Strong);
+            let message = cut(message, usize::from(width - 2));
+            pen.text(1, height - 1, &message, Role::Strong);
         }
         None => help::hints(pen, height - 1, Screen::Report, Hand::Nobody),
     }
@@ -292,6 +293,7 @@ mod tests {
                 section("Group: balance · thesis", vec![Item::Table(table), Item::Figure(figure)]),
                 section("S01 001", vec![]),
             ],
+            comparisons: vec![],
             left_out: vec![LeftOut { path: "logs/x".to_owned(), why: "it is empty".to_owned() }],
         }
     }
@@ -341,6 +343,13 @@ mod tests {
         press(&mut pages, KeyCode::Char('?'));
         assert_eq!(press(&mut pages, KeyCode::Char('q')), Reaction::Stay, "closes the help");
         assert_eq!(press(&mut pages, KeyCode::Char('q')), Reaction::Quit);
+    }
+
+    #[test]
+    fn a_long_message_is_cut() {
+        let mut pages = Pages::new(&report());
+        pages.say(format!("saved {}.svg here", "long-".repeat(40)));
+        assert!(shown(&mut pages, 80, 24).to_string().contains('…'));
     }
 
     #[test]

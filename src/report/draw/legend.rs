@@ -30,7 +30,7 @@ pub(super) fn legend(series: &[Series], top: f64) -> (String, f64) {
         // Writing to a text cannot fail.
         let _ = write!(
             svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"{TEXT}\">{label}</text>",
+            "<text class=\"legend\" x=\"{:.1}\" y=\"{:.1}\" font-size=\"{TEXT}\">{label}</text>",
             x + SAMPLE + 8.0,
             y + 4.5
         );
@@ -49,8 +49,15 @@ fn sample(svg: &mut String, series: &Series, x: f64, y: f64) {
             "<path d=\"M{x:.1} {y:.1}h{SAMPLE}\" stroke=\"{ink}\" stroke-width=\"{width}\"{dashes}/>"
         );
     }
-    if let Mark::Shape(shape) | Mark::Linked(shape) = series.mark {
+    if let Mark::Shape(shape) | Mark::Linked(shape) | Mark::DashLinked(shape) = series.mark {
         let (x, y) = (x + SAMPLE / 2.0, y);
+        if series.spread.is_some() {
+            let _ = write!(
+                svg,
+                "<path d=\"M{x:.1} {:.1}v16\" stroke=\"{ink}\" stroke-width=\"1\"/>",
+                y - 8.0
+            );
+        }
         let _ = match shape % 6 {
             0 => write!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{ink}\"/>"),
             1 => path(svg, &ink, x, y, "m0 -4.5l4 8h-8z", true),
@@ -92,7 +99,7 @@ mod tests {
 
     #[test]
     fn every_series_has_its_sample_and_its_name() {
-        let marks = [Mark::Line, Mark::Dashed, Mark::Shape(0), Mark::Linked(1), Mark::Shape(3)];
+        let marks = [Mark::Line, Mark::Dashed, Mark::Shape(0), Mark::DashLinked(1), Mark::Shape(3)];
         let all: Vec<Series> = marks.iter().map(|mark| series("S<01>", *mark)).collect();
         let (svg, height) = legend(&all, 300.0);
         assert_eq!(svg.matches("S&lt;01&gt;").count(), 5);

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::{Group, Subject, average, curve};
+use super::{Group, Subject, average, last_average};
 use crate::report::achieved::yardstick;
-use crate::report::figure::{Caption, Table};
+use crate::report::figure::{Caption, Contrast, Table};
 use crate::report::gather::Recorded;
 use crate::report::metrics::{deviation, mean};
 use crate::report::series::WINDOW;
@@ -24,6 +24,8 @@ pub(super) struct Compared {
     pub(super) table: Option<Table>,
     /// In sentences.
     pub(super) sentences: Vec<String>,
+    /// In numbers.
+    pub(super) contrasts: Vec<Contrast>,
 }
 
 /// What is compared: its name, and the number of a session.
@@ -34,11 +36,7 @@ fn measures(task: &str) -> [Measure; 3] {
     [
         (format!("{name}, robot alone"), |session| average(session, Phase::Autonomous)),
         (format!("{name}, teaching"), |session| average(session, Phase::Main)),
-        (format!("{name}, last {WINDOW} rollouts"), |session| {
-            let values = curve(session);
-            let last = &values[values.len().saturating_sub(WINDOW)..];
-            (!last.is_empty()).then(|| mean(last))
-        }),
+        (format!("{name}, last {WINDOW} rollouts"), last_average),
     ]
 }
 
@@ -68,6 +66,15 @@ impl Pairing {
             Self::Seeds
         } else {
             Self::None
+        }
+    }
+
+    /// By what they are paired.
+    const fn word(self) -> Option<&'static str> {
+        match self {
+            Self::None => None,
+            Self::Subjects => Some("subject"),
+            Self::Seeds => Some("seed"),
         }
     }
 
@@ -122,12 +129,12 @@ fn without_narrow_interval(compared: Comparison) -> Comparison {
 pub(super) fn table(group: &Group<'_>) -> Compared {
     let arms = [group.arm(Mode::Simultaneous), group.arm(Mode::Sequential)];
     if arms.iter().any(Vec::is_empty) {
-        return Compared { table: None, sentences: Vec::new() };
+        return Compared { table: None, sentences: Vec::new(), contrasts: Vec::new() };
     }
     let is_simulated =
         group.sessions.iter().all(|session| session.operator.starts_with("simulated"));
     let pairing = Pairing::of(&arms, is_simulated);
-    let (mut rows, mut sentences) = (Vec::new(), Vec::new());
+    let (mut rows, mut sentences, mut contrasts) = (Vec::new(), Vec::new(), Vec::new());
     for (name, of) in measures(group.task) {
         let [a, b] = pairing.values(&arms, |subject| subject.mean_of(of));
         let compared = match pairing {
@@ -140,6 +147,14 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
                 "{}, simultaneous against sequential: {compared}.",
                 words::heading(&name)
             ));
+            contrasts.push(Contrast {
+                preset: group.preset.clone(),
+                measure: name.clone(),
+                unit: yardstick(group.task).unit,
+                of: [Mode::Simultaneous, Mode::Sequential].map(Mode::word),
+                paired_by: pairing.word(),
+                comparison: *compared,
+            });
         }
         if !a.is_empty() || !b.is_empty() {
             rows.push(row(group.task, name, [&a, &b], compared.as_ref()));
@@ -188,7 +203,7 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
         .to_vec(),
         rows,
     };
-    Compared { table: Some(table), sentences }
+    Compared { table: Some(table), sentences, contrasts }
 }
 
 fn row(
@@ -215,11 +230,16 @@ fn row(
             ),
             compared.hedges_g.map_or_else(|| nothing.clone(), |g| format!("{g:+.2}")),
             test(compared.test),
-            format!("{:.3}", compared.p),
-            compared.smallest_p.map_or(nothing, |p| format!("{p:.3}")),
+            chance(compared.p),
+            compared.smallest_p.map_or(nothing, chance),
         ],
     });
     row
+}
+
+/// A chance with three decimals, or that it is smaller than they show: it is never 0.
+fn chance(p: f64) -> String {
+    if p < 0.001 { "< 0.001".to_owned() } else { format!("{p:.3}") }
 }
 
 fn test(test: Test) -> String {

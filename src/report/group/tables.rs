@@ -1,7 +1,7 @@
 //! The tables of a group: its subjects, the regions of swing-up (table 1), and what swing-up came
 //! to (table 2).
 
-use super::{Group, average, curve, tenths};
+use super::{Group, average, last_average, tenths};
 use crate::report::achieved::yardstick;
 use crate::report::figure::{Caption, Table};
 use crate::report::gather::Recorded;
@@ -37,11 +37,7 @@ pub(super) fn subjects(group: &Group<'_>) -> Option<Table> {
             let end = |of: fn(&crate::record::EpisodeRow) -> Option<f64>| {
                 subject.mean_of(|session| of(session.of_phase(Phase::Main).last()?))
             };
-            let last = subject.mean_of(|session| {
-                let values = curve(session);
-                let last = &values[values.len().saturating_sub(WINDOW)..];
-                (!last.is_empty()).then(|| mean(last))
-            });
+            let last = subject.mean_of(last_average);
             let first_tenth = subject.mean_of(|session| tenths(session).into_values().next());
             let alone = |phase| subject.mean_of(|session| average(session, phase));
             let percent = |value: Option<f64>| number(value.map(|value| 100.0 * value), 0);

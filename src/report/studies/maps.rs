@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Part, pair, role};
+use super::{Part, is_dashed, pair, role};
 use crate::report::figure::{Axis, Cells, Content, Figure, Mark, Series};
 use crate::report::gather::Driven;
 use crate::report::words;
@@ -149,7 +149,7 @@ impl Part<'_> {
                     .filter_map(|row| Some((*row.at.first()?, *row.at.get(1)?)))
                     .collect();
                 let steps = path.len().saturating_sub(1);
-                let mark = if at == 0 { Mark::Line } else { Mark::Dashed };
+                let mark = if is_dashed(arm, at) { Mark::Dashed } else { Mark::Line };
                 let label = format!("{arm}, {readout}: {steps} steps");
                 series.push(Series::new(label, role(arm, at), mark, path));
             }

@@ -24,7 +24,11 @@ pub(super) fn draw(pen: &mut Pen<'_>, figure: &Figure) {
     let axes = format!("   ↑ {}   → {}", figure.y.title(), figure.x.title());
     let after = pen.text(0, 1, &figure.caption.preset, Role::Dim);
     pen.text(after, 1, &axes, Role::Dim);
-    let sentence = wrapped(&figure.caption.sentence, usize::from(width));
+    let mut sentence = figure.caption.sentence.clone();
+    if hides_spread(figure) {
+        sentence.push_str(" The spread is left out here: it is in the file.");
+    }
+    let sentence = wrapped(&sentence, usize::from(width));
     let legend = match &figure.content {
         Content::Series(series) => legend(pen, series),
         Content::Cells(cells) => vec![vec![(scale(cells), Role::Text)]],
@@ -50,6 +54,18 @@ pub(super) fn draw(pen: &mut Pen<'_>, figure: &Figure) {
     }
 }
 
+/// Whether a spread is not drawn.
+fn hides_spread(figure: &Figure) -> bool {
+    let Content::Series(series) = &figure.content else { return false };
+    series.iter().any(|one| one.spread.is_some() && spread_of(one).is_none())
+}
+
+/// The spread of a series that is drawn.
+fn spread_of(series: &Series) -> Option<&Vec<(f64, f64)>> {
+    let is_drawn = |spread: &&Vec<_>| spread.len() == series.points.len();
+    series.spread.as_ref().filter(is_drawn).filter(|spread| spread.len() <= MOST_BARS)
+}
+
 /// What stands for a series: its colour and its sign.
 fn look_of(series: &Series, at: usize, glyphs: Glyphs) -> (Role, Marker, char) {
     const SIGNS: [char; 6] = ['o', '^', 'x', '+', '*', '#'];
@@ -67,7 +83,7 @@ fn look_of(series: &Series, at: usize, glyphs: Glyphs) -> (Role, Marker, char) {
         Mark::Thin => (role, line, '·'),
         Mark::Dashed => (role, Marker::Custom('-'), '-'),
         Mark::Dotted => (role, Marker::Custom('\''), '\''),
-        Mark::Shape(shape) | Mark::Linked(shape) => {
+        Mark::Shape(shape) | Mark::Linked(shape) | Mark::DashLinked(shape) => {
             let sign =
                 SIGNS[(shape + usize::from(matches!(series.role, Meaning::One(_))) * at) % 6];
             (role, Marker::Custom(sign), sign)
@@ -119,11 +135,8 @@ fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
             };
             drawn.push((role, marker, kind, points));
         }
-        if let Some(spread) = &one.spread
-            && spread.len() == one.points.len()
-            && spread.len() <= MOST_BARS
-        {
-            let ends = one.points.iter().zip(spread);
+        if let Some(spread) = spread_of(one) {
+            let ends = one.points.iter().zip(spread).filter(|(point, _)| point.1.is_finite());
             let ends = ends.flat_map(|((x, _), (a, b))| [(*x, *a), (*x, *b)]).collect();
             drawn.push((Role::Dim, Marker::Dot, GraphType::Scatter, ends));
         }
@@ -165,7 +178,14 @@ fn bounds(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64) {
 fn axis<'a>(pen: &Pen<'_>, axis: &'a Axis, (least, most): (f64, f64)) -> ChartAxis<'a> {
     let style: Style = pen.style(Role::Dim);
     let labels: Vec<Line<'_>> = if axis.names.is_empty() {
-        [least, f64::midpoint(least, most), most].map(|value| Line::raw(short(value))).to_vec()
+        let middle = f64::midpoint(least, most);
+        if !axis.is_whole {
+            [least, middle, most].map(|value| Line::raw(short(value))).to_vec()
+        } else if middle.fract() == 0.0 {
+            [least, middle, most].map(|value| Line::raw(format!("{value:.0}"))).to_vec()
+        } else {
+            [least, most].map(|value| Line::raw(format!("{value:.0}"))).to_vec()
+        }
     } else {
         let names = axis.names.iter().map(|(_, name)| Line::raw(name.clone()));
         // Labels stand evenly apart: where half a place is left at both ends, so are blanks.
