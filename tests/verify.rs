@@ -102,6 +102,7 @@ fn a_session_cut_at_any_byte_is_the_same_up_to_there() {
     for file in names(&whole) {
         fs::copy(whole.join(&file), cut.join(&file)).unwrap();
     }
+    set_status(&cut, "running");
     let (length, last) = (steps.len(), header + 1);
     let after_a_row = steps[..length / 2].iter().rposition(|byte| *byte == b'\n').unwrap() + 1;
     for bytes in [0, 10, header, last, length / 3, length / 2, after_a_row, length - 1, length] {
@@ -109,13 +110,70 @@ fn a_session_cut_at_any_byte_is_the_same_up_to_there() {
         let (verdict, code) = verdict(&desk, &cut);
         let lines = steps[..bytes].split_inclusive(|byte| *byte == b'\n');
         let kept = lines.filter(|line| line.ends_with(b"\n")).count();
-        assert_eq!(code, Some(0), "{bytes}: {verdict}");
+        assert_eq!(code, Some(if kept > 1 { 0 } else { 2 }), "{bytes}: {verdict}");
+        assert_eq!(verdict["verified"], kept > 1, "{bytes}: {verdict}");
+        assert_eq!(verdict["partial"], true, "{bytes}: {verdict}");
         assert_eq!(verdict["rows"], kept.saturating_sub(1), "{bytes}: {verdict}");
     }
     // The other table may have been cut as well.
     let episodes = fs::read(whole.join("episodes.csv")).unwrap();
     fs::write(cut.join("episodes.csv"), &episodes[..episodes.len() / 2]).unwrap();
     assert_verified(&desk, &cut);
+}
+
+/// Changes how the session in `folder` ended.
+fn set_status(folder: &Path, status: &str) {
+    let sidecar = folder.join("session.json");
+    let kept = fs::read_to_string(&sidecar).unwrap();
+    let changed = kept.replace("\"status\": \"complete\"", &format!("\"status\": \"{status}\""));
+    assert_ne!(changed, kept);
+    fs::write(&sidecar, changed).unwrap();
+}
+
+/// The first so many lines of `text`.
+fn head(text: &str, lines: usize) -> String {
+    text.split_inclusive('\n').take(lines).collect()
+}
+
+#[test]
+fn rows_that_a_complete_session_lacks_or_has_too_many_are_named() {
+    let desk = Desk::new();
+    let folder = session(&desk, "balance", "--operator simulated:average --rollouts 3");
+    let (steps, episodes) = (folder.join("steps.csv"), folder.join("episodes.csv"));
+    let whole =
+        ["steps.csv", "episodes.csv"].map(|file| fs::read_to_string(folder.join(file)).unwrap());
+    let [rows, rollouts] = whole.each_ref().map(|text| text.lines().count());
+    let differs = |file: &str, line: usize, status: &str| {
+        let (verdict, code) = verdict(&desk, &folder);
+        let found = &verdict["difference"];
+        assert_eq!((code, &verdict["verified"]), (Some(1), &Value::Bool(false)), "{verdict}");
+        assert_eq!((&found["file"], &found["line"]), (&file.into(), &line.into()), "{status}");
+        verdict
+    };
+    // In a rollout, after one, and without the last row of all.
+    let after_one = 1 + whole[0].lines().position(|row| row.starts_with("main,2,0,")).unwrap();
+    for kept in [2, rows / 2, after_one - 1, rows - 1] {
+        fs::write(&steps, head(&whole[0], kept)).unwrap();
+        assert_eq!(differs("steps.csv", kept + 1, "complete")["partial"], true);
+    }
+    fs::write(&steps, "").unwrap();
+    let (nothing, code) = verdict(&desk, &folder);
+    assert_eq!((code, &nothing["verified"]), (Some(2), &Value::Bool(false)), "{nothing}");
+    assert!(nothing["refused"].as_str().unwrap().contains("nothing to compare"), "{nothing}");
+    fs::write(&steps, &whole[0]).unwrap();
+    for kept in [1, rollouts - 1] {
+        fs::write(&episodes, head(&whole[1], kept)).unwrap();
+        assert_eq!(differs("episodes.csv", kept + 1, "complete")["partial"], true);
+    }
+    let last: String = whole[1].split_inclusive('\n').skip(rollouts - 1).collect();
+    fs::write(&episodes, format!("{}{last}", whole[1])).unwrap();
+    differs("episodes.csv", rollouts + 1, "complete");
+    set_status(&folder, "running");
+    differs("episodes.csv", rollouts + 1, "running");
+    // One that was cut may have kept fewer.
+    fs::write(&episodes, head(&whole[1], 2)).unwrap();
+    assert_verified(&desk, &folder);
+    assert_eq!(verdict(&desk, &folder).0["partial"], true);
 }
 
 /// Changes a digit of `column`, the first behind the point, in the row `line` (from 1, the header) of a table, and
@@ -167,6 +225,7 @@ fn a_single_changed_digit_is_named() {
     let said = desk.program("replay --verify").arg(&folder).output().unwrap();
     let words = text(&said.stdout);
     assert!(words.contains("main 2, step 30, column u: recorded"), "{words}");
+    assert!(words.contains("u_human is taken as recorded"), "{words}");
     fs::write(&steps, &whole).unwrap();
 
     let episodes = folder.join("episodes.csv");

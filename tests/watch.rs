@@ -7,15 +7,16 @@
 mod desk;
 
 use std::fs;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
-use std::os::unix::net::UnixStream;
+use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::thread;
 
 use coadapt::clock::{Clock, WallClock};
 use coadapt::control::snapshot::{self, Publisher, Snapshot};
-use coadapt::control::watch::line::{Hello, Line};
+use coadapt::control::watch::line::{Hello, Line, Strange};
 use coadapt::control::watch::{Following, Found, Place, Post};
 use coadapt::record::{EpisodeRow, Sidecar, read_sidecar};
 use coadapt::session::machine::{Finish, Stage};
@@ -170,6 +171,73 @@ fn who_never_reads_holds_up_nobody() {
     let lines: Vec<String> = lines.collect();
     let (_, whole) = lines.split_last().unwrap();
     assert!(whole.iter().all(|line| Line::read(line).is_ok()));
+}
+
+#[test]
+fn who_does_not_answer_is_named_and_holds_up_nobody() {
+    let desk = Desk::new();
+    let session = Show::open(&desk);
+    let me = std::process::id();
+    // One that lets nobody in, one that says nothing, one that drips, one that is no text.
+    let bind = |number: u32| {
+        UnixListener::bind(session.folder.join(format!("{me}-{number}.sock"))).unwrap()
+    };
+    let [full, _mute, dripping, strange] = [1001, 1002, 1003, 1004].map(bind);
+    full.set_nonblocking(true).unwrap();
+    rustix::net::listen(&full, 0).unwrap();
+    let _first = UnixStream::connect(full.local_addr().unwrap().as_pathname().unwrap()).unwrap();
+    let drip = thread::spawn(move || {
+        let (mut stream, _) = dripping.accept().unwrap();
+        let mut clock = WallClock::start();
+        while stream.write_all(b"x").is_ok() {
+            assert!(clock.now() < Seconds(60.0), "it is still waited for");
+            clock.wait_until(clock.now() + Seconds(0.05));
+        }
+    });
+    let babble = thread::spawn(move || {
+        let (mut stream, _) = strange.accept().unwrap();
+        stream.write_all(b"\xff\xfe\n").unwrap();
+    });
+    let (found, strange) = Found::all(&session.place);
+    drip.join().unwrap();
+    babble.join().unwrap();
+    assert_eq!(found.len(), 1);
+    assert_eq!(found[0].socket, session.socket());
+    let pid = i32::try_from(me).unwrap();
+    let silent = strange.iter().filter(|why| **why == Strange::Silent { pid }).count();
+    let texts = strange.iter().filter(|why| matches!(why, Strange::Text(_))).count();
+    assert_eq!((silent, texts), (3, 1), "{strange:?}");
+    assert!(strange.iter().any(|why| why.to_string().contains(&format!("PID {pid} does not"))));
+}
+
+#[test]
+fn bytes_that_are_no_text_end_nothing() {
+    let desk = Desk::new();
+    let session = Show::open(&desk);
+    session.publisher.publish(&seen(9));
+    let folder = desk.at("other");
+    let place = Place::at([folder.clone()]);
+    place.open().unwrap();
+    let listener =
+        UnixListener::bind(folder.join(format!("{}-1.sock", std::process::id()))).unwrap();
+    let mut real = BufReader::new(UnixStream::connect(session.socket()).unwrap());
+    let relay = thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let mut line = Vec::new();
+        real.read_until(b'\n', &mut line).unwrap();
+        stream.write_all(&line).unwrap();
+        stream.write_all(b"\xff\n").unwrap();
+        line.clear();
+        real.read_until(b'\n', &mut line).unwrap();
+        stream.write_all(&line).unwrap();
+        stream
+    });
+    let following = Found::all(&place).0.remove(0).follow();
+    soon("what follows", || following.news() == 2);
+    assert_eq!(following.watcher.look().tick, Tick(9));
+    assert!(!following.is_over());
+    drop(relay.join().unwrap());
+    soon("the end", || following.is_over());
 }
 
 /// The program, whose sockets are in the desk's own folder.

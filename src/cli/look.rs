@@ -14,8 +14,9 @@ Home and End go through time, n and p through rollouts, N and P through phases, 
 Enter to that rollout; y, r and m show your, the robot's and the motor's (net) action as curves.
 
 --verify does the session once more, from its profile, its seed and what its person did, and
-compares every number of its rows bit by bit; the first difference is named. It works on sessions
-that were cut or resumed, with discarded rollouts; not on those of a real plant.
+compares every number of its rows bit by bit; the first difference is named, and so is a row that a
+complete session lacks or has too many. u_human is taken as recorded: where it changed, u differs.
+It works on sessions that were cut or resumed, with discarded rollouts; not on those of a real plant.
 Exit codes: 0 the same, 1 it differs, 2 it cannot be compared.";
 
 /// The words of `replay`.

@@ -103,7 +103,7 @@ struct Object<'a> {
     verified: bool,
     rows: u64,
     rollouts: u64,
-    /// Whether more may follow: the session was cut, or still runs.
+    /// Whether more may follow: the session or a table was cut, or it still runs.
     partial: bool,
     difference: Option<&'a Difference>,
     /// What recorded it, where that is not this program.
@@ -133,13 +133,14 @@ fn checked(
         is_foreign.then(|| format!("coadapt {} on {}", sidecar.version, sidecar.host.architecture));
     let (verdict, refused) = match verify(folder, profile, sidecar, agent) {
         Ok(verdict) => (verdict, None),
-        Err(error @ VerifyError::RealPlant { .. }) if words.json => {
-            (Verdict { rows: 0, rollouts: 0, difference: None }, Some(error.to_string()))
+        Err(error @ (VerifyError::RealPlant { .. } | VerifyError::NoRows { .. })) if words.json => {
+            let nothing = Verdict { rows: 0, rollouts: 0, partial: true, difference: None };
+            (nothing, Some(error.to_string()))
         }
         Err(error) => return Err(usage(&error)),
     };
     let is_same = verdict.difference.is_none() && refused.is_none();
-    let partial = sidecar.status != Status::Complete;
+    let partial = verdict.partial || sidecar.status != Status::Complete;
     if words.json {
         let object = Object {
             schema: 1,
@@ -169,7 +170,7 @@ fn checked(
 
 /// The verdict for people.
 fn sentences(folder: &Path, sidecar: &Sidecar, verdict: &Verdict) -> Vec<String> {
-    let Verdict { rows, rollouts, difference } = verdict;
+    let Verdict { rows, rollouts, difference, .. } = verdict;
     let same = format!("{rows} rows and {rollouts} rollouts");
     let mut lines = match difference {
         None => vec![
@@ -191,6 +192,8 @@ fn sentences(folder: &Path, sidecar: &Sidecar, verdict: &Verdict) -> Vec<String>
     if difference.is_none() && sidecar.status == Status::Running {
         let still = if folder::is_busy(folder) { "still runs" } else { "was cut" };
         lines.push(format!("the session {still}: this is as far as it goes"));
+    } else if difference.is_none() && verdict.partial {
+        lines.push("a table ends before the session does: this is as far as it goes".to_owned());
     }
     lines
 }

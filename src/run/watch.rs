@@ -3,18 +3,21 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::rc::Rc;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::time::Duration;
 
 use super::replay::shown;
 use super::session::{Session, usage};
 use super::{RunError, screen};
 use crate::cli;
-use crate::control::watch::line::Hello;
+use crate::control::watch::line::{Hello, Strange};
 use crate::control::watch::{Found, Place, Post, WatchError};
 use crate::profile::Document;
 use crate::record::{self, Sidecar, Status};
 use crate::session::Subject;
 use crate::tui::terminal::{KeysFrom, Screen};
-use crate::tui::watch::{self, Lookout, Watched};
+use crate::tui::watch::{self, Awaiting, Lookout, Watched};
 
 /// Lets others of this user watch `session`, for as long as the post is kept.
 ///
@@ -30,9 +33,9 @@ pub(super) fn post(session: &Session) -> Result<Post, WatchError> {
 pub(super) fn watch(words: &cli::Watch) -> Result<ExitCode, RunError> {
     let wanted = Wanted::of(words.session.as_deref())?;
     Screen::check(KeysFrom::Input).map_err(|error| usage(&error))?;
-    let mut watcher = Watching { wanted, place: Place::here() };
+    let mut watcher = Watching::new(wanted, Place::here());
     // Of several one must be named before anything is shown.
-    let (found, _) = watcher.look_around();
+    let found = watcher.look_around();
     if found.len() > 1 {
         let mut lines = vec!["several sessions run; name one:".to_owned()];
         lines.extend(found.iter().map(|session| named(&session.hello)));
@@ -111,19 +114,89 @@ fn absolute(folder: &Path) -> PathBuf {
     fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned())
 }
 
+/// What a look around finds: the sessions that fit, and the others that are not understood.
+type Seen = (Vec<Found>, Vec<Strange>);
+
+/// How long the screen waits for a look around. Sessions that answer do so at once.
+const PATIENCE: Duration = Duration::from_millis(20);
+
 struct Watching {
     wanted: Wanted,
     place: Place,
+    /// A look around that takes its time, for some session does not answer.
+    under_way: Option<Receiver<Seen>>,
+    /// What was said last.
+    said: Awaiting,
 }
 
 impl Watching {
-    /// The sessions that fit, and what is said of those that are not understood.
-    fn look_around(&self) -> (Vec<Found>, Vec<String>) {
-        let (mut found, strange) = Found::all(&self.place);
+    fn new(wanted: Wanted, place: Place) -> Self {
+        let said = Awaiting { title: NOTHING.to_owned(), words: Vec::new() };
+        let mut watching = Self { wanted, place, under_way: None, said };
+        watching.said.words = watching.awaited();
+        watching
+    }
+
+    /// The sessions that fit.
+    fn look_around(&self) -> Vec<Found> {
+        let (mut found, _) = Found::all(&self.place);
         found.retain(|session| self.wanted.is(&session.hello));
-        (found, strange.iter().map(|why| format!("A session runs, but {why}.")).collect())
+        found
+    }
+
+    /// The sessions that fit, and those that are not understood; `None` while that is looked for.
+    /// A thread of its own does it: nothing that another program does holds up the screen.
+    fn glance(&mut self) -> Option<Seen> {
+        let under_way = self.under_way.take().or_else(|| {
+            let (tell, hear) = mpsc::channel();
+            let place = self.place.clone();
+            let looker = std::thread::Builder::new().name("coadapt-lookout".to_owned());
+            looker.spawn(move || tell.send(Found::all(&place))).ok().map(|_| hear)
+        })?;
+        match under_way.recv_timeout(PATIENCE) {
+            Ok((mut found, strange)) => {
+                found.retain(|session| self.wanted.is(&session.hello));
+                Some((found, strange))
+            }
+            Err(RecvTimeoutError::Timeout) => {
+                self.under_way = Some(under_way);
+                None
+            }
+            Err(RecvTimeoutError::Disconnected) => None,
+        }
+    }
+
+    /// What is awaited, and where it is looked for.
+    fn awaited(&self) -> Vec<String> {
+        let folders: Vec<String> =
+            self.place.folders().iter().map(|folder| folder.display().to_string()).collect();
+        vec![self.wanted.words(), format!("Looked for in {}.", folders.join(", "))]
+    }
+
+    /// What to say of sessions of which none can be watched.
+    fn words(&self, found: &[Found], strange: &[Strange]) -> Awaiting {
+        let mut words: Vec<String> = strange
+            .iter()
+            .map(|why| match why {
+                Strange::Silent { .. } => format!("{why}."),
+                _ => format!("A session runs, but {why}."),
+            })
+            .collect();
+        let is_silent = strange.iter().any(|why| matches!(why, Strange::Silent { .. }));
+        let title = if found.len() > 1 {
+            words.push("Leave with q and name one:".to_owned());
+            words.extend(found.iter().map(|session| named(&session.hello)));
+            "several sessions run"
+        } else {
+            words.extend(self.awaited());
+            if is_silent { "a session does not answer" } else { NOTHING }
+        };
+        Awaiting { title: title.to_owned(), words }
     }
 }
+
+/// What stands above the words while there is no session.
+const NOTHING: &str = "nothing to watch yet";
 
 struct Looking<'a> {
     watching: &'a mut Watching,
@@ -131,18 +204,18 @@ struct Looking<'a> {
 }
 
 impl Lookout for Looking<'_> {
-    fn find(&mut self) -> Result<Watched, Vec<String>> {
-        let (mut found, mut words) = self.watching.look_around();
-        if found.len() > 1 {
-            words.push("Several sessions run. Leave with q and name one:".to_owned());
-            words.extend(found.iter().map(|session| named(&session.hello)));
-            return Err(words);
-        }
-        let Some(session) = found.pop() else {
-            words.push(self.watching.wanted.words());
-            return Err(words);
+    fn find(&mut self) -> Result<Watched, Awaiting> {
+        let Some((mut found, strange)) = self.watching.glance() else {
+            return Err(self.watching.said.clone());
         };
-        watched(session).map_err(|why| vec![why])
+        self.watching.said = self.watching.words(&found, &strange);
+        match found.pop() {
+            Some(session) if found.is_empty() => watched(session).map_err(|why| Awaiting {
+                title: "a session cannot be shown".to_owned(),
+                words: vec![why],
+            }),
+            _ => Err(self.watching.said.clone()),
+        }
     }
 
     fn is_told_to_end(&self) -> bool {
@@ -157,11 +230,13 @@ fn watched(session: Found) -> Result<Watched, String> {
         .read()
         .map_err(|report| report.to_string())?;
     let info = screen::info_of(&profile, sidecar);
-    let following = session.follow();
+    let following = Rc::new(session.follow());
+    let followed = Rc::clone(&following);
     Ok(Watched {
         info,
         watcher: following.watcher.clone(),
         screen: profile.screen.clone(),
-        is_over: Box::new(move || following.is_over()),
+        is_over: Box::new(move || followed.is_over()),
+        news: Box::new(move || following.news()),
     })
 }

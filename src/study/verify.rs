@@ -19,14 +19,17 @@ use crate::operator::Operator;
 use crate::operator::playback::Playback;
 use crate::profile::Profile;
 use crate::record::reader::{Episodes, Steps};
-use crate::record::{self, EpisodeRow, Sidecar, StepRow, policy};
+use crate::record::{self, EpisodeRow, Sidecar, Status, StepRow, policy};
 use crate::session::machine::Stage;
 use crate::session::plan::Plan;
 use crate::session::{Moment, Phase};
 use crate::signal::End;
 
 pub use difference::Difference;
-use difference::{ended_otherwise, episodes as compare_episodes, rows as compare_rows};
+use difference::{
+    ended_otherwise, episodes as compare_episodes, missing_rollout, missing_row,
+    rows as compare_rows, surplus_rollout,
+};
 
 /// What came of doing a session once more.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +38,8 @@ pub struct Verdict {
     pub rows: u64,
     /// and of `episodes.csv`.
     pub rollouts: u64,
+    /// Whether a table ends before the session does.
+    pub partial: bool,
     /// The first number that is not.
     pub difference: Option<Difference>,
 }
@@ -50,6 +55,12 @@ pub enum VerifyError {
     RealPlant {
         /// The plant, as on the command line.
         backend: String,
+    },
+    /// Not one whole row is in it.
+    #[error("{path}: there is nothing to compare: not one step was recorded")]
+    NoRows {
+        /// The table.
+        path: String,
     },
     /// A file does not read.
     #[error(transparent)]
@@ -88,7 +99,11 @@ pub fn verify(
     if sidecar.backend != "simulated" {
         return Err(VerifyError::RealPlant { backend: sidecar.backend.clone() });
     }
-    Retrial::begin(folder, profile, sidecar, agent)?.carry_out()
+    let verdict = Retrial::begin(folder, profile, sidecar, agent)?.carry_out()?;
+    if verdict.rows == 0 && verdict.difference.is_none() {
+        return Err(VerifyError::NoRows { path: folder.join("steps.csv").display().to_string() });
+    }
+    Ok(verdict)
 }
 
 /// The files of the recorded session.
@@ -133,6 +148,11 @@ struct Retrial {
     clock: VirtualClock,
     pacer: Pacer,
     evidence: Evidence,
+    status: Status,
+    /// The last row that was compared,
+    last: Option<StepRow<String>>,
+    /// and the next one, where the tick that led to it led to one more.
+    next: Option<StepRow>,
     verdict: Verdict,
 }
 
@@ -175,8 +195,9 @@ impl Retrial {
         let cycle = Cycle::new(rules, crew, learner, None);
         let clock = VirtualClock::default();
         let pacer = Pacer::new(&clock);
-        let verdict = Verdict { rows: 0, rollouts: 0, difference: None };
-        Ok(Self { cycle, watcher, playback, clock, pacer, evidence, verdict })
+        let verdict = Verdict { rows: 0, rollouts: 0, partial: false, difference: None };
+        let (status, last, next) = (sidecar.status, None, None);
+        Ok(Self { cycle, watcher, playback, clock, pacer, evidence, status, last, next, verdict })
     }
 
     /// Does tick after tick, up to the last recorded row or the first difference.
@@ -186,7 +207,35 @@ impl Retrial {
         {
             self.verdict.difference = self.redo(&row?)?;
         }
+        if self.verdict.difference.is_none() && self.last.is_some() {
+            self.verdict.difference = self.ending()?;
+        }
         Ok(self.verdict)
+    }
+
+    /// What does not fit where `steps.csv` ends: a complete session goes on, or `episodes.csv`
+    /// tells of rollouts that did not take place.
+    fn ending(&mut self) -> Result<Option<Difference>, VerifyError> {
+        let stage = self.watcher.look().stage;
+        let is_whole = self.next.is_none() && matches!(stage, Stage::Finished(_));
+        self.verdict.partial |= !is_whole;
+        if !is_whole && self.status == Status::Complete {
+            let place = match &self.next {
+                Some(row) => Some((row.phase, row.episode, row.step)),
+                None => stage.moment().map(|next| (next.phase, next.rollout, next.step)),
+            };
+            return Ok(place.map(|place| missing_row(place, self.verdict.rows)));
+        }
+        let Some(surplus) = self.evidence.episodes.next().transpose()? else { return Ok(None) };
+        // Whoever was killed may have kept more of one table than of the other.
+        let order = |phase| Phase::ALL.iter().position(|one| *one == phase);
+        let comes_later = self.last.as_ref().is_some_and(|last| {
+            (order(surplus.phase), surplus.episode) >= (order(last.phase), last.episode)
+        });
+        if self.status == Status::Running && !is_whole && comes_later {
+            return Ok(None);
+        }
+        Ok(Some(surplus_rollout(&surplus, self.verdict.rollouts)))
     }
 
     /// Does once more what led to `row`, and compares.
@@ -220,18 +269,27 @@ impl Retrial {
         let mut computed = notes.steps.iter();
         let mut recorded = Some(Ok(row.clone()));
         while let Some(row) = recorded.take() {
-            let found = compare_rows(&row?, computed.next(), &self.evidence.columns);
+            let row = row?;
+            let found = compare_rows(&row, computed.next(), &self.evidence.columns);
             if let Some(cell) = found {
                 return Ok(Some(cell.at_row(self.verdict.rows)));
             }
             self.verdict.rows += 1;
+            self.last = Some(row);
             // The last state of a rollout comes with the tick that ended it.
             if computed.len() > 0 {
                 recorded = self.evidence.steps.next();
             }
         }
+        self.next = computed.next().copied();
         for computed in &notes.episodes {
-            let Some(recorded) = self.evidence.episodes.next() else { break };
+            let Some(recorded) = self.evidence.episodes.next() else {
+                self.verdict.partial = true;
+                if self.status == Status::Complete {
+                    return Ok(Some(missing_rollout(computed, self.verdict.rollouts)));
+                }
+                break;
+            };
             let found = compare_episodes(&recorded?, computed, &self.evidence.tally);
             if let Some(cell) = found {
                 return Ok(Some(cell.at_rollout(self.verdict.rollouts)));

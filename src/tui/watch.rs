@@ -26,6 +26,17 @@ pub struct Watched {
     pub screen: profile::Screen,
     /// Whether nothing more will come.
     pub is_over: Box<dyn Fn() -> bool>,
+    /// How often something came so far.
+    pub news: Box<dyn Fn() -> u64>,
+}
+
+/// What is said while nothing is watched.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Awaiting {
+    /// In one line.
+    pub title: String,
+    /// What is awaited, which sessions there are, what is wrong with them.
+    pub words: Vec<String>,
 }
 
 /// The widest line of what is said while nothing is watched.

@@ -62,7 +62,7 @@ impl Line {
     }
 }
 
-/// Why a line is not understood.
+/// Why a session, or a line of one, is not understood.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Strange {
     /// Another version wrote it.
@@ -76,6 +76,12 @@ pub enum Strange {
         schema: u32,
         /// Its program's version.
         version: String,
+    },
+    /// It says nothing.
+    #[error("PID {pid} does not answer: is it stopped? `kill -CONT {pid}` lets it go on")]
+    Silent {
+        /// Its program.
+        pid: i32,
     },
     /// It is something else.
     #[error("this is no line of a session: {0}")]

@@ -6,6 +6,8 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 
+use rustix::io::Errno;
+use rustix::net::{AddressFamily, SocketAddrUnix, SocketType};
 use rustix::process::{Pid, geteuid, test_kill_process};
 
 use super::WatchError;
@@ -24,17 +26,24 @@ pub struct Place {
 }
 
 impl Place {
-    /// The place on this computer: the user's runtime folder, or else one in the folder for
-    /// temporary files.
+    /// The place on this computer: the user's runtime folder, or else the usual one, or else one
+    /// in the folder for temporary files.
     #[must_use]
     pub fn here() -> Self {
-        let name = format!("coadapt-{}", geteuid().as_raw());
         let runtime = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
-        let runtime = runtime.filter(|folder| folder.is_absolute());
-        let mut folders: Vec<PathBuf> =
-            runtime.map(|folder| folder.join("coadapt")).into_iter().collect();
-        for temporary in [std::env::temp_dir(), PathBuf::from("/tmp")] {
-            let folder = temporary.join(&name);
+        Self::of(runtime, std::env::temp_dir(), geteuid().as_raw())
+    }
+
+    /// The place of the user `uid`. Not every shell knows the `runtime` folder that a session's
+    /// had, so that the usual one is among them.
+    fn of(runtime: Option<PathBuf>, temporary: PathBuf, uid: u32) -> Self {
+        let usual = PathBuf::from(format!("/run/user/{uid}"));
+        let runtimes = runtime.filter(|folder| folder.is_absolute()).into_iter().chain([usual]);
+        let runtimes = runtimes.map(|folder| folder.join("coadapt"));
+        let others = [temporary, PathBuf::from("/tmp")];
+        let others = others.map(|folder| folder.join(format!("coadapt-{uid}")));
+        let mut folders = Vec::new();
+        for folder in runtimes.chain(others) {
             if !folders.contains(&folder) {
                 folders.push(folder);
             }
@@ -49,6 +58,12 @@ impl Place {
             folder.join(LONGEST_NAME).as_os_str().len() < LONGEST_PATH && folder.is_absolute()
         };
         Self { folders: folders.into_iter().filter(fits).collect() }
+    }
+
+    /// The folders, those first that are preferred.
+    #[must_use]
+    pub fn folders(&self) -> &[PathBuf] {
+        &self.folders
     }
 
     /// The first folder that is this user's alone, made where there is none.
@@ -111,22 +126,37 @@ fn is_own(folder: &Path) -> io::Result<()> {
 
 /// Whether nobody will ever answer at `socket`; it is then removed.
 fn is_stale(socket: &Path) -> bool {
-    let maker = socket
-        .file_name()
-        .and_then(|name| name.to_str())
-        .and_then(|name| name.split('-').next())
-        .and_then(|pid| pid.parse().ok())
-        .and_then(Pid::from_raw);
-    let is_gone = maker.is_none_or(|pid| test_kill_process(pid) == Err(rustix::io::Errno::SRCH));
-    let refuses = || {
-        UnixStream::connect(socket)
-            .is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused)
-    };
-    let is_stale = is_gone && refuses();
+    let maker = pid_of(socket).and_then(Pid::from_raw);
+    let is_gone = maker.is_none_or(|pid| test_kill_process(pid) == Err(Errno::SRCH));
+    let is_stale = is_gone && knock(socket).is_err_and(|why| why == Errno::CONNREFUSED);
     if is_stale {
         let _ = fs::remove_file(socket);
     }
     is_stale
+}
+
+/// The program that made `socket`, by the socket's name.
+pub(super) fn pid_of(socket: &Path) -> Option<i32> {
+    socket.file_name()?.to_str()?.split('-').next()?.parse().ok()
+}
+
+/// Connects to `socket` without waiting: who is stopped lets no more than a few come in, and
+/// the others wait at the door for ever.
+///
+/// # Errors
+/// `AGAIN` when too many wait there already; otherwise as the system says.
+pub(super) fn knock(socket: &Path) -> Result<UnixStream, Errno> {
+    let waits = |stream: &UnixStream, may: bool| {
+        let set = stream.set_nonblocking(!may);
+        set.map_err(|error| Errno::from_io_error(&error).unwrap_or(Errno::IO))
+    };
+    let stream =
+        UnixStream::from(rustix::net::socket(AddressFamily::UNIX, SocketType::STREAM, None)?);
+    rustix::io::fcntl_setfd(&stream, rustix::io::FdFlags::CLOEXEC)?;
+    waits(&stream, false)?;
+    rustix::net::connect(&stream, &SocketAddrUnix::new(socket)?)?;
+    waits(&stream, true)?;
+    Ok(stream)
 }
 
 /// Whether the other end of `stream` is a program of this user. Where the system does not tell,
@@ -161,6 +191,37 @@ mod tests {
         std::os::unix::fs::symlink(&open, &link).unwrap();
         let error = Place::at([link]).open().unwrap_err().to_string();
         assert!(error.contains("XDG_RUNTIME_DIR"), "{error}");
+    }
+
+    #[test]
+    fn the_usual_runtime_folder_is_among_them_whatever_the_shell_knows() {
+        let folders = |runtime: Option<&str>| {
+            let place = Place::of(runtime.map(PathBuf::from), "/tmp".into(), 1234);
+            let folders = place.folders().iter();
+            folders.map(|folder| folder.display().to_string()).collect::<Vec<_>>()
+        };
+        let usual = ["/run/user/1234/coadapt", "/tmp/coadapt-1234"];
+        for runtime in [None, Some("/run/user/1234"), Some("not/from/the/root")] {
+            assert_eq!(folders(runtime), usual);
+        }
+        assert_eq!(folders(Some("/my/own")), ["/my/own/coadapt", usual[0], usual[1]]);
+    }
+
+    #[test]
+    fn who_lets_nobody_in_is_not_waited_for() {
+        let desk = tempfile::tempdir().unwrap();
+        let socket = desk.path().join(name(1));
+        let _stopped = UnixListener::bind(&socket).unwrap();
+        let mut inside = Vec::new();
+        // The system lets some wait at the door, and says so once they are too many.
+        let refused = loop {
+            match knock(&socket) {
+                Ok(stream) => inside.push(stream),
+                Err(why) => break why,
+            }
+            assert!(inside.len() < 10_000);
+        };
+        assert!([Errno::AGAIN, Errno::CONNREFUSED].contains(&refused), "{refused}");
     }
 
     #[test]

@@ -45,7 +45,13 @@ impl Display for Difference {
             shown(&self.computed),
             self.file,
             self.line
-        )
+        )?;
+        // The actions follow from what the person did, which is not computed.
+        if self.file == "steps.csv" && ["u", "u_applied", "success"].contains(&self.column.as_str())
+        {
+            write!(f, " (u_human is taken as recorded: it may be the one that changed)")?;
+        }
+        Ok(())
     }
 }
 
@@ -181,8 +187,50 @@ pub(super) fn ended_otherwise(row: &StepRow<String>, rows: u64, end: End) -> Dif
         phase: row.phase,
         episode: row.episode,
         step: Some(row.step),
-        column: "u".to_owned(),
+        column: "reward".to_owned(),
         recorded: format!("the end of the rollout ({})", end.word()),
         computed: "the rollout goes on".to_owned(),
+    }
+}
+
+/// `steps.csv` ends after so many `rows`; but the session goes on with the step at this place.
+pub(super) fn missing_row((phase, episode, step): (Phase, u32, u32), rows: u64) -> Difference {
+    Difference {
+        file: "steps.csv",
+        line: rows + 2,
+        phase,
+        episode,
+        step: Some(step),
+        column: "step".to_owned(),
+        recorded: "the end of the table".to_owned(),
+        computed: "the session goes on".to_owned(),
+    }
+}
+
+/// `episodes.csv` ends after so many `rows`; but the session has one more rollout, `computed`.
+pub(super) fn missing_rollout(computed: &EpisodeRow, rows: u64) -> Difference {
+    Difference {
+        file: "episodes.csv",
+        line: rows + 2,
+        phase: computed.phase,
+        episode: computed.episode,
+        step: None,
+        column: "end".to_owned(),
+        recorded: "the end of the table".to_owned(),
+        computed: computed.end.word().to_owned(),
+    }
+}
+
+/// `episodes.csv` tells, after so many `rows`, of one more rollout; but the session has none.
+pub(super) fn surplus_rollout(recorded: &EpisodeRow, rows: u64) -> Difference {
+    Difference {
+        file: "episodes.csv",
+        line: rows + 2,
+        phase: recorded.phase,
+        episode: recorded.episode,
+        step: None,
+        column: "end".to_owned(),
+        recorded: recorded.end.word().to_owned(),
+        computed: "no such rollout".to_owned(),
     }
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ratatui::crossterm::event::Event;
 
-use super::{Watched, draw, draw_waiting};
+use super::{Awaiting, Watched, draw, draw_waiting};
 use crate::clock::Clock;
 use crate::control::snapshot::Snapshot;
 use crate::profile::Glyphs;
@@ -26,6 +26,8 @@ const SAMPLE: Seconds = Seconds(1.0);
 const SAMPLES: usize = 512;
 /// How often sessions are looked for.
 const LOOKOUT: Seconds = Seconds(0.5);
+/// A session of which nothing came for so long may be stopped.
+const QUIET: Seconds = Seconds(2.0);
 
 /// Does what the screen cannot: finds sessions, hears signals.
 pub trait Lookout {
@@ -33,7 +35,7 @@ pub trait Lookout {
     ///
     /// # Errors
     /// Words for the person: what is awaited, which sessions there are.
-    fn find(&mut self) -> Result<Watched, Vec<String>>;
+    fn find(&mut self) -> Result<Watched, Awaiting>;
 
     /// Whether a signal asked the program to end.
     fn is_told_to_end(&self) -> bool;
@@ -44,6 +46,8 @@ struct Page {
     watched: Watched,
     history: History,
     panel: Snapshot,
+    /// How often something came, and when it did last.
+    news: (u64, Seconds),
     panel_due: Seconds,
     sample_due: Seconds,
 }
@@ -54,7 +58,7 @@ pub fn show(screen: &mut Screen, lookout: &mut dyn Lookout) -> End {
     screen.keep_mouse(Mouse::Unread);
     let mut ui = Ui { look: look(Glyphs::Auto), ..Ui::default() };
     let mut page: Option<Page> = None;
-    let mut words = Vec::new();
+    let mut awaiting = Awaiting { title: String::new(), words: Vec::new() };
     let mut lookout_due = clock.now();
     loop {
         let now = clock.now();
@@ -66,13 +70,14 @@ pub fn show(screen: &mut Screen, lookout: &mut dyn Lookout) -> End {
                     ui.look = look(watched.screen.glyphs);
                     page = Some(Page::new(watched, now));
                 }
-                Err(said) => words = said,
+                Err(said) => awaiting = said,
             }
         }
         let drawn = match &mut page {
             Some(page) => page.draw(screen, &mut ui, now),
             None => screen.draw(|frame| {
-                draw_waiting(frame, "nothing to watch yet", &words, ui.help_open, ui.look);
+                let Awaiting { title, words } = &awaiting;
+                draw_waiting(frame, title, words, ui.help_open, ui.look);
             }),
         };
         if drawn.is_err() {
@@ -110,7 +115,8 @@ fn hear(screen: &Screen, lookout: &dyn Lookout, ui: &mut Ui, due: Seconds) -> Op
 impl Page {
     fn new(watched: Watched, now: Seconds) -> Self {
         let panel = watched.watcher.look();
-        Self { watched, history: History::default(), panel, panel_due: now, sample_due: now }
+        let (history, news) = (History::default(), (0, now));
+        Self { watched, history, panel, news, panel_due: now, sample_due: now }
     }
 
     fn is_over(&self) -> bool {
@@ -134,7 +140,15 @@ impl Page {
             sample(&mut self.history, &scene);
         }
         ui.waits = watcher.waits();
-        ui.message = self.is_over().then(|| over(&scene).to_owned());
+        let count = (self.watched.news)();
+        if count != self.news.0 {
+            self.news = (count, now);
+        }
+        ui.message = if (self.watched.is_over)() {
+            Some(over(&scene).to_owned())
+        } else {
+            quiet(now - self.news.1)
+        };
         screen.draw(|frame| draw(frame, info, (&scene, &self.panel), &self.history, ui))
     }
 }
@@ -147,6 +161,12 @@ const fn over(scene: &Snapshot) -> &'static str {
     }
 }
 
+/// What is said of a session from which nothing came for so long, which may be too long.
+fn quiet(since: Seconds) -> Option<String> {
+    (since >= QUIET)
+        .then(|| format!("no news for {:.0} s: is the session stopped?", since.0.floor()))
+}
+
 fn sample(history: &mut History, scene: &Snapshot) {
     if let Stage::Running(moment) = scene.stage
         && moment.phase == Phase::Main
@@ -155,5 +175,17 @@ fn sample(history: &mut History, scene: &Snapshot) {
             history.success.remove(0);
         }
         history.success.push(scene.successes.get(scene.region).copied().unwrap_or(0.0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_session_of_which_nothing_comes_is_said_to_be_quiet() {
+        assert_eq!(quiet(Seconds(1.9)), None);
+        let said = quiet(Seconds(65.8));
+        assert_eq!(said.as_deref(), Some("no news for 65 s: is the session stopped?"));
     }
 }
