@@ -114,6 +114,7 @@ fn a_page_and_its_files_are_written_whole() {
 }
 
 #[test]
+<<<<<<< ours
 fn what_was_recorded_is_never_written_over() {
     let desk = Desk::new();
     session(&desk, "balance", "S1", "simultaneous", 1);
@@ -152,6 +153,27 @@ fn subjects_in_both_modes_are_paired_and_the_others_left_out_of_it() {
     assert!(report.contains("n = 3 pairs"), "{report}");
     assert!(report.contains("in one mode only: C1"), "{report}");
     assert!(!report.contains("BCa interval"), "three pairs are too few for one");
+=======
+fn figures_go_by_the_rollouts_own_numbers() {
+    let desk = Desk::new();
+    session(&desk, "balance", "S1", "simultaneous", 1);
+    let path = desk.at("logs/S1/001-balance-simultaneous/episodes.csv");
+    let rows = fs::read_to_string(&path).unwrap();
+    let lost = |row: &&str| !row.starts_with("main,5,");
+    let kept: Vec<&str> = rows.lines().filter(lost).collect();
+    assert_eq!(kept.len() + 1, rows.lines().count());
+    fs::write(&path, kept.join("\n") + "\n").unwrap();
+    desk.succeed("report logs --csv data");
+    let read = |name: &str| {
+        let file = desk.at(&format!("data/S1-001-balance-simultaneous-{name}.csv"));
+        fs::read_to_string(file).unwrap()
+    };
+    for name in ["per-rollout", "success", "share"] {
+        let csv = read(name);
+        assert!(csv.contains("\nsimultaneous,5,,,\n"), "a gap in {name}: {csv}");
+        assert!(csv.contains("\nsimultaneous,14,"), "{name}: {csv}");
+    }
+>>>>>>> theirs
 }
 
 #[test]

@@ -87,7 +87,7 @@ impl Series {
 
     /// The unbroken parts of it, each with its part of the spread, where there is one.
     #[must_use]
-    pub fn pieces_within(&self) -> Vec<(&[(f64, f64)], Option<&[(f64, f64)]>)> {
+    pub fn pieces_within(&self) -> Vec<Piece<'_>> {
         let is_whole = |&(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
         let mut from = 0;
         let mut pieces = Vec::new();
@@ -101,6 +101,9 @@ impl Series {
         pieces
     }
 }
+
+/// An unbroken part of a series, and its part of the spread.
+pub type Piece<'a> = (&'a [(f64, f64)], Option<&'a [(f64, f64)]>);
 
 /// An axis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -250,6 +253,7 @@ pub struct Table {
 /// A figure or a table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
+#[expect(clippy::large_enum_variant, reason = "a report has some hundreds of them")]
 pub enum Item {
     /// A figure.
     Figure(Figure),
