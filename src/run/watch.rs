@@ -148,7 +148,7 @@ impl Watching {
     /// A thread of its own does it: nothing that another program does holds up the screen.
     fn glance(&mut self) -> Option<Seen> {
         let under_way = self.under_way.take().or_else(|| {
-            let (tell, hear) = mpsc::channel();
+            let (tell, hear) = mpsc::sync_channel(1);
             let place = self.place.clone();
             let looker = std::thread::Builder::new().name("coadapt-lookout".to_owned());
             looker.spawn(move || tell.send(Found::all(&place))).ok().map(|_| hear)
