@@ -114,7 +114,6 @@ fn a_page_and_its_files_are_written_whole() {
 }
 
 #[test]
-<<<<<<< ours
 fn what_was_recorded_is_never_written_over() {
     let desk = Desk::new();
     session(&desk, "balance", "S1", "simultaneous", 1);
@@ -153,7 +152,8 @@ fn subjects_in_both_modes_are_paired_and_the_others_left_out_of_it() {
     assert!(report.contains("n = 3 pairs"), "{report}");
     assert!(report.contains("in one mode only: C1"), "{report}");
     assert!(!report.contains("BCa interval"), "three pairs are too few for one");
-=======
+}
+
 fn figures_go_by_the_rollouts_own_numbers() {
     let desk = Desk::new();
     session(&desk, "balance", "S1", "simultaneous", 1);
@@ -173,7 +173,6 @@ fn figures_go_by_the_rollouts_own_numbers() {
         assert!(csv.contains("\nsimultaneous,5,,,\n"), "a gap in {name}: {csv}");
         assert!(csv.contains("\nsimultaneous,14,"), "{name}: {csv}");
     }
->>>>>>> theirs
 }
 
 #[test]
