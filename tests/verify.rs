@@ -320,9 +320,9 @@ fn a_session_with_pauses_stops_and_discarded_rollouts_is_the_same_once_more() {
     };
     let session = Session::begin(&order, &Company::Attended(keys)).unwrap();
     let (folder, watcher) = (session.folder().to_owned(), session.watcher.clone());
-    let person = thread::spawn(move || impatient(&watcher));
-    session.run(&mut VirtualClock::default(), || None).unwrap();
-    person.join().unwrap();
+    session
+        .run(&mut Impatient { time: VirtualClock::default(), watcher, turn: 0 }, || None)
+        .unwrap();
     let episodes = fs::read_to_string(folder.join("episodes.csv")).unwrap();
     let discarded = |phase: &str| {
         let of_phase = episodes.lines().filter(|row| row.starts_with(phase));
@@ -334,25 +334,37 @@ fn a_session_with_pauses_stops_and_discarded_rollouts_is_the_same_once_more() {
     assert_verified(&desk, &folder);
 }
 
-/// A person who reads nothing, and throws away, stops or pauses one rollout after the other.
-fn impatient(watcher: &Watcher) {
-    let mut clock = WallClock::start();
-    let mut turn = 0_u32;
-    loop {
-        assert!(clock.now() < Seconds(120.0), "{:?}", watcher.look().stage);
-        match watcher.look().stage {
-            Stage::Finished(_) => return,
-            Stage::Running(moment) if moment.step > 20 && turn < 40 => {
-                turn += 1;
-                let wish = [Command::Discard, Command::Pause, Command::Stop];
-                watcher.ask(wish[(turn % 3) as usize].clone());
+/// The time of a person who reads nothing, and throws away, stops, pauses or leaves alone one
+/// rollout after the other.
+struct Impatient {
+    time: VirtualClock,
+    watcher: Watcher,
+    turn: usize,
+}
+
+impl Clock for Impatient {
+    fn now(&self) -> Seconds {
+        self.time.now()
+    }
+
+    fn wait_until(&mut self, deadline: Seconds) -> Seconds {
+        match self.watcher.look().stage {
+            Stage::Running(moment) if moment.step == 21 && self.turn < 40 => {
+                self.turn += 1;
+                let wishes =
+                    [None, Some(Command::Discard), Some(Command::Pause), Some(Command::Stop)];
+                wishes[self.turn % 4].clone().map(|wish| self.watcher.ask(wish));
             }
             Stage::Instruction(_) | Stage::Break { .. } | Stage::Paused(_) | Stage::Stopped(_) => {
-                watcher.ask(Command::Begin);
+                self.watcher.ask(Command::Begin);
             }
             _ => {}
         }
-        clock.wait_until(clock.now() + Seconds(0.001));
+        self.time.wait_until(deadline)
+    }
+
+    fn is_wall(&self) -> bool {
+        false
     }
 }
 
