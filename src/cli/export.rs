@@ -27,7 +27,7 @@ pub struct Export {
     /// csv, parquet or mcap.
     #[arg(long, value_name = "FORM")]
     pub to: Form,
-    /// The folder, or MCAP file, to be made [default: <subject>-<trial>-<task>-<mode>-<FORM>, here].
+    /// The folder, or MCAP file, to be made [default: SUBJECT-TRIAL-TASK-MODE-FORM, here].
     #[arg(long, value_name = "PATH")]
     pub out: Option<PathBuf>,
     /// Print one JSON object instead of a sentence.
