@@ -2,26 +2,21 @@
 
 use std::fs;
 use std::io::{self, Write as _};
-use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 use std::process::ExitCode;
 
 use serde::Serialize;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use super::shutdown::Shutdown;
-use super::{RunError, panics, progress, say, signal_code, tell};
+use super::replay::shown;
+use super::{RunError, progress, say, tell};
 use crate::cli;
-use crate::clock::WallClock;
-use crate::operator::terminal::Hands;
 use crate::record::VERSION;
 use crate::report::compose::compose;
 use crate::report::figure::{Item, Report};
 use crate::report::gather::{Gathered, find, gather};
 use crate::report::{draw, html, text};
-use crate::tui::app::End;
 use crate::tui::report::{Bench, Pages, show};
-use crate::tui::terminal::{Feed, KeysFrom, Screen, give_back};
+use crate::tui::terminal::{KeysFrom, Screen};
 
 /// Of the JSON object.
 const SCHEMA: u32 = 1;
@@ -51,7 +46,8 @@ pub(super) fn report(words: &cli::Report) -> Result<ExitCode, RunError> {
         say(&json(&report, &gathered)?)?;
     } else if words.out.is_none() && words.csv.is_none() {
         if Screen::check(KeysFrom::Input).is_ok() {
-            return on_screen(&report);
+            let pages = Pages::new(&report);
+            return shown(|screen, is_over| show(screen, &mut Desk { is_over }, pages));
         }
         say(&text::lines(&report).join("\n"))?;
     }
@@ -59,11 +55,11 @@ pub(super) fn report(words: &cli::Report) -> Result<ExitCode, RunError> {
 }
 
 /// Does what the screen cannot.
-struct Desk {
-    shutdown: Shutdown,
+struct Desk<'a> {
+    is_over: &'a dyn Fn() -> bool,
 }
 
-impl Bench for Desk {
+impl Bench for Desk<'_> {
     fn save(&mut self, item: &Item) -> String {
         let (data, name) = (item.data_file(), &item.caption().name);
         match (write_item(item, Path::new(".")), item) {
@@ -74,30 +70,8 @@ impl Bench for Desk {
     }
 
     fn is_told_to_end(&self) -> bool {
-        self.shutdown.signal().is_some()
+        (self.is_over)()
     }
-}
-
-/// Shows the report until the person leaves.
-fn on_screen(report: &Report) -> Result<ExitCode, RunError> {
-    let keyboard = crate::operator::terminal::Params::default();
-    let feed = Feed::new(Hands::new(&keyboard), WallClock::start());
-    let mut desk = Desk { shutdown: Shutdown::listen() };
-    let pages = Pages::new(report);
-    let mut screen =
-        Screen::take(feed, KeysFrom::Input).map_err(|error| RunError::Usage(error.to_string()))?;
-    let ended = panic::catch_unwind(AssertUnwindSafe(|| show(&mut screen, &mut desk, pages)));
-    // A terminal that is gone lets even its farewell fail.
-    let _ = panic::catch_unwind(AssertUnwindSafe(|| drop(screen)));
-    give_back();
-    panics::tell_last_words();
-    Ok(match ended {
-        Ok(End::Quit) => ExitCode::SUCCESS,
-        Ok(End::Interrupted) => signal_code(SIGINT),
-        Ok(End::Signal) => signal_code(desk.shutdown.signal().unwrap_or(SIGTERM)),
-        Ok(End::Lost) => signal_code(SIGHUP),
-        Err(_) => return Err(RunError::Failed("the screen failed".to_owned())),
-    })
 }
 
 fn read(words: &cli::Report) -> Gathered {

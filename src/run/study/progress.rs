@@ -1,11 +1,10 @@
 //! Progress on standard error: a bar where somebody looks, a line now and then where it is a file.
 
-use std::io::{self, IsTerminal};
 use std::sync::{Mutex, PoisonError};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::ProgressBar;
 
-use super::super::tell;
+use super::super::{progress, tell};
 use crate::clock::{Clock, WallClock};
 use crate::signal::Seconds;
 use crate::study::batch::Progress;
@@ -32,19 +31,8 @@ pub(super) struct Lines {
 impl Bar {
     /// A bar of `runs` runs.
     pub(super) fn new(runs: usize) -> Self {
-        let is_dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-        if !io::stderr().is_terminal() || is_dumb || runs == 0 {
-            return Self::Told(Lines { clock: WallClock::start(), due: Mutex::new(FIRST_WORD) });
-        }
-        let target = ProgressDrawTarget::stderr_with_hz(5);
-        let bar = ProgressBar::with_draw_target(Some(runs as u64), target);
-        let template = "{pos}/{len} runs {wide_bar} {percent:>3} %  {eta:>4} left{msg}";
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style.progress_chars("=> "));
-        }
-        // Drawn at once: the first run may take minutes.
-        bar.tick();
-        Self::Drawn(bar)
+        let lines = || Lines { clock: WallClock::start(), due: Mutex::new(FIRST_WORD) };
+        progress::bar(runs, "runs").map_or_else(|| Self::Told(lines()), Self::Drawn)
     }
 
     /// Shows `progress`.
