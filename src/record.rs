@@ -32,7 +32,7 @@ pub use error::Error;
 pub use evaluation::EvaluationRow;
 pub use folder::Folder;
 pub use policy::{Policy, policy_text, read_policy};
-pub use sidecar::{Sidecar, Status, read_sidecar};
+pub use sidecar::{Sidecar, Status, read_sidecar, sidecar_of};
 pub use steps::StepFile;
 pub use writer::{Columns, Manner, Recorder};
 

@@ -208,7 +208,8 @@ fn what_is_no_session_is_said_to_be_none() {
         text(&output.stderr)
     };
     assert!(refusal("export empty --to csv").contains("session.json"));
-    assert!(refusal("export nowhere --to csv --out out").contains("no session is here"));
+    assert!(refusal("export nowhere --to csv --out out").contains("no such folder"));
+    assert!(refusal("export logs --to csv").contains(&format!("such as {SESSION}")));
     assert!(refusal(&format!("export {SESSION} --to xls")).contains("csv, parquet or mcap"));
     let path = desk.at(SESSION).join("session.json");
     let newer = fs::read_to_string(&path).unwrap().replacen("\"schema\": 1", "\"schema\": 9", 1);

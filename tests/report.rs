@@ -297,6 +297,30 @@ fn a_session_that_was_cut_is_shown_but_counts_in_no_group() {
 }
 
 #[test]
+fn a_complete_session_with_lost_rollouts_counts_in_no_group() {
+    let desk = Desk::new();
+    session(&desk, "balance", "S1", "simultaneous", 1);
+    let folder = desk.at("logs/S1/001-balance-simultaneous");
+    let notes = || json(&desk, "report logs --json")["sections"][0]["notes"].to_string();
+    assert!(notes().contains("A subject counts once"), "{}", notes());
+    let episodes = folder.join("episodes.csv");
+    let whole = fs::read_to_string(&episodes).unwrap();
+    let last = whole.trim_end().rfind('\n').unwrap() + 1;
+    for broken in [&whole[..last], &format!("{whole}?"), &format!("{whole}@#\n")] {
+        fs::write(&episodes, broken).unwrap();
+        let notes = notes();
+        assert!(notes.contains("Rows of its rollouts are lost"), "{notes}");
+        assert!(notes.contains("counts in no group"), "{notes}");
+    }
+    // Rows of single ticks are not what a subject is counted by.
+    fs::write(&episodes, &whole).unwrap();
+    fs::write(folder.join("steps.csv"), "").unwrap();
+    let report = json(&desk, "report logs --json");
+    assert!(report["sections"][0]["notes"].to_string().contains("A subject counts once"));
+    assert!(report["left_out"][0]["why"].as_str().unwrap().contains("holds no rows"));
+}
+
+#[test]
 fn swing_up_has_its_regions_and_tables() {
     let desk = Desk::new();
     for (subject, mode) in [("S1", "sequential"), ("S2", "simultaneous")] {

@@ -393,7 +393,11 @@ fn what_cannot_be_done_once_more_is_said() {
     let output = desk.run(&format!("replay {here} --verify"));
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("steps.csv, line 1"), "{}", text(&output.stderr));
-    for (path, said) in [("nowhere", "session.json is missing"), (".", "session.json is missing")] {
+    for (path, said) in [
+        ("nowhere", "no such folder"),
+        (".", "session.json is missing"),
+        ("logs", "give one of them, such as logs/"),
+    ] {
         let output = desk.run(&format!("replay {path} --verify"));
         assert_eq!(output.status.code(), Some(2));
         assert!(text(&output.stderr).contains(said), "{}", text(&output.stderr));

@@ -36,6 +36,22 @@ pub enum Error {
         /// What is wrong, and what to do.
         problem: String,
     },
+    /// A folder is no session's.
+    #[error("{}: {why}", path.display())]
+    NoSession {
+        /// The folder.
+        path: PathBuf,
+        /// What is there instead, and what to give.
+        why: String,
+    },
+    /// An export has no place.
+    #[error("cannot export to {}: {cause}; name another place with --out PATH", path.display())]
+    NoPlace {
+        /// Where it was to be.
+        path: PathBuf,
+        /// What the system said.
+        cause: io::Error,
+    },
     /// Another process records this session.
     #[error(
         "{} is being recorded by another coadapt; let that one end first, or start a new session",
@@ -61,6 +77,30 @@ impl Error {
     pub(super) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |cause| Self::Io { action, path, cause }
+    }
+
+    /// What is wrong with the file or folder, without its name.
+    #[must_use]
+    pub fn why(&self) -> String {
+        let whole = self.to_string();
+        let rest = whole.strip_prefix(&self.path().display().to_string());
+        rest.map_or_else(
+            || whole.clone(),
+            |rest| rest.trim_start_matches([':', ',', ' ']).to_owned(),
+        )
+    }
+
+    /// The file or folder that it is about.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        let (Self::Io { path, .. }
+        | Self::Cell { path, .. }
+        | Self::Unfit { path, .. }
+        | Self::NoSession { path, .. }
+        | Self::NoPlace { path, .. }
+        | Self::Busy { path }
+        | Self::WriterDied { path }) = self;
+        path
     }
 
     pub(super) fn unfit(path: &Path, problem: impl Into<String>) -> Self {

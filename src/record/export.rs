@@ -20,11 +20,12 @@ mod columnar;
 mod timeline;
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::names::{SESSION, STEPS};
-use super::{Error, Sidecar, read_sidecar};
+use super::names::STEPS;
+use super::{Error, Sidecar, sidecar_of};
 use survey::Rollout;
 
 /// What an export is made of.
@@ -94,10 +95,7 @@ pub(super) struct Recorded {
 
 impl Recorded {
     fn open(folder: &Path) -> Result<Self, Error> {
-        if !folder.is_dir() {
-            return Err(Error::unfit(folder, "no session is here; give the folder of one"));
-        }
-        let facts = read_sidecar(&folder.join(SESSION))?;
+        let facts = sidecar_of(folder)?;
         if !folder.join(STEPS).is_file() {
             return Err(Error::unfit(folder, "steps.csv is missing: there is nothing to export"));
         }
@@ -133,7 +131,7 @@ impl Recorded {
 /// # Errors
 /// When there is no session.
 pub fn usual_name(folder: &Path, form: Form) -> Result<PathBuf, Error> {
-    let facts = read_sidecar(&folder.join(SESSION))?;
+    let facts = sidecar_of(folder)?;
     let joint = match form {
         Form::Csv | Form::Parquet => '-',
         Form::Mcap => '.',
@@ -171,6 +169,21 @@ fn demand_nothing_at(out: &Path) -> Result<(), Error> {
     }
 }
 
+/// The disk refused an export; `cause` may name a place that nobody asked for.
+fn no_place(out: &Path, cause: &io::Error) -> Error {
+    Error::NoPlace { path: out.to_owned(), cause: cause.kind().into() }
+}
+
+/// `error`, of `out` where it was of a file in `place`, which the user does not know.
+fn of_place(error: Error, place: &Path, out: &Path) -> Error {
+    match error {
+        Error::Io { path, cause, .. } if path.starts_with(place) || path == out => {
+            no_place(out, &cause)
+        }
+        other => other,
+    }
+}
+
 /// The folder that something is to be in.
 fn parent(out: &Path) -> &Path {
     out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
@@ -182,10 +195,10 @@ fn in_folder<T>(out: &Path, write: impl FnOnce(&Path) -> Result<T, Error>) -> Re
     builder.prefix(".coadapt-").suffix(".new");
     #[cfg(unix)]
     builder.permissions(usual_rights(0o777));
-    let place = builder.tempdir_in(parent(out)).map_err(Error::io("make the folder", out))?;
-    let written = write(place.path())?;
+    let place = builder.tempdir_in(parent(out)).map_err(|cause| no_place(out, &cause))?;
+    let written = write(place.path()).map_err(|error| of_place(error, place.path(), out))?;
     demand_nothing_at(out)?;
-    fs::rename(place.path(), out).map_err(Error::io("make the folder", out))?;
+    fs::rename(place.path(), out).map_err(|cause| no_place(out, &cause))?;
     // It is elsewhere now: there is nothing to clear away.
     let _ = place.keep();
     Ok(written)
@@ -198,9 +211,9 @@ fn as_file<T>(out: &Path, write: impl FnOnce(&fs::File) -> Result<T, Error>) -> 
     builder.prefix(".coadapt-").suffix(".new");
     #[cfg(unix)]
     builder.permissions(usual_rights(0o666));
-    let place = builder.tempfile_in(parent(out)).map_err(Error::io("create", out))?;
-    let written = write(place.as_file())?;
-    place.persist_noclobber(out).map_err(|fault| Error::io("create", out)(fault.error))?;
+    let place = builder.tempfile_in(parent(out)).map_err(|cause| no_place(out, &cause))?;
+    let written = write(place.as_file()).map_err(|error| of_place(error, place.path(), out))?;
+    place.persist_noclobber(out).map_err(|fault| no_place(out, &fault.error))?;
     Ok(written)
 }
 

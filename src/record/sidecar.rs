@@ -1,12 +1,14 @@
 //! `session.json`: all that the rows do not say about a session.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use super::Error;
 use super::document::{self, Document};
+use super::names::SESSION;
 use crate::session::{Phase, Subject, Trial};
 use crate::sharing::Mode;
 
@@ -165,9 +167,65 @@ pub fn read_sidecar(path: &Path) -> Result<Sidecar, Error> {
     document::read(path)
 }
 
+/// Reads the facts of the session in `folder`.
+///
+/// # Errors
+/// When the folder is no session's; of those in it one is named. Or when its `session.json` does
+/// not read.
+pub fn sidecar_of(folder: &Path) -> Result<Sidecar, Error> {
+    let file = folder.join(SESSION);
+    if file.is_file() {
+        return read_sidecar(&file);
+    }
+    let give = "give a session's folder, such as logs/S07/001-balance-simultaneous";
+    let why = if !folder.exists() {
+        format!("there is no such folder; {give}")
+    } else if let Some(session) = a_session_in(folder) {
+        format!(
+            "this folder is no recorded session but holds some; give one of them, such as {}",
+            session.display()
+        )
+    } else {
+        format!("this folder is no recorded session, for {SESSION} is missing; {give}")
+    };
+    Err(Error::NoSession { path: folder.to_owned(), why })
+}
+
+/// The first session in `folder`, or in a folder of it.
+fn a_session_in(folder: &Path) -> Option<PathBuf> {
+    let below = |folder: &Path| {
+        let mut folders: Vec<PathBuf> = fs::read_dir(folder)
+            .into_iter()
+            .flatten()
+            .filter_map(|entry| Some(entry.ok()?.path()))
+            .filter(|path| path.is_dir())
+            .collect();
+        folders.sort();
+        folders
+    };
+    let nearby = below(folder);
+    let farther = nearby.iter().flat_map(|folder| below(folder));
+    nearby.iter().cloned().chain(farther).find(|folder| folder.join(SESSION).is_file())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_above_sessions_names_one_of_them() {
+        let logs = tempfile::tempdir().unwrap();
+        let refused = |folder: &Path| sidecar_of(folder).unwrap_err().to_string();
+        assert!(refused(&logs.path().join("S9")).contains("no such folder"));
+        assert!(refused(logs.path()).contains("session.json is missing"));
+        let session = logs.path().join("S1").join("001-balance-simultaneous");
+        fs::create_dir_all(&session).unwrap();
+        fs::write(session.join(SESSION), "{}").unwrap();
+        for above in [logs.path(), &logs.path().join("S1")] {
+            assert!(refused(above).ends_with(&format!("such as {}", session.display())));
+        }
+        assert!(!refused(&session).contains("no recorded session"));
+    }
 
     #[test]
     fn a_timing_tells_of_a_real_plant_where_there_was_one() {

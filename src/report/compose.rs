@@ -7,7 +7,6 @@ use super::gather::{Gathered, Recorded};
 use super::group::{self, Group};
 use super::session::{self, View};
 use super::{pair, studies, words};
-use crate::record::Status;
 use crate::sharing::Mode;
 
 /// What must be the same in sessions that are compared.
@@ -106,8 +105,7 @@ fn groups(sessions: &[Recorded]) -> Vec<Group<'_>> {
                 );
                 stem = format!("{stem}-variant-{}", at + 1);
             }
-            let (sessions, cut) =
-                members.iter().partition(|session| session.status == Status::Complete);
+            let (sessions, cut) = members.iter().partition(|session| session.is_complete());
             let stem =
                 stem.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "-");
             groups.push(Group { task, preset: label, stem, sessions, cut });

@@ -12,7 +12,6 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::figure::LeftOut;
-use crate::record::Status;
 
 pub use field::Field;
 pub use outcome::{
@@ -149,8 +148,8 @@ pub fn gather(found: Found, told: &(dyn Fn() + Sync)) -> Gathered {
             scope.spawn(|| {
                 while let Some(path) = sessions.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let outcome = read(path, points).map_err(|error| LeftOut {
-                        path: path.display().to_string(),
-                        why: error.to_string(),
+                        path: error.path().display().to_string(),
+                        why: error.why(),
                     });
                     // A thread that panicked has left what it had.
                     shelf.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(outcome);
@@ -192,8 +191,7 @@ fn one_of_each_trial(sessions: Vec<Recorded>, left_out: &mut Vec<LeftOut>) -> Ve
     let mut kept = Vec::new();
     for (_, mut same) in trials {
         same.sort_by_cached_key(|session| {
-            let is_cut = session.status != Status::Complete;
-            (is_cut, usize::MAX - session.rollouts.len(), session.path.clone())
+            (!session.is_complete(), usize::MAX - session.rollouts.len(), session.path.clone())
         });
         let mut same = same.into_iter();
         let Some(first) = same.next() else { continue };

@@ -263,8 +263,8 @@ impl<'a> Group<'a> {
             number,
             &format!("{title}, {} group", mode.word()),
             format!(
-                "The {label} at the end of each rollout of main, of each of {} of the {} group.",
-                words::counted(arm.len(), "subject"),
+                "The {label} at the end of each rollout of main, of {} of the {} group.",
+                words::each(arm.len(), "subject"),
                 mode.word()
             ),
         );

@@ -178,6 +178,7 @@ impl View<'_> {
         )];
         let main = session.of_phase(Phase::Main).len();
         let status = match session.status {
+            Status::Complete if session.lost > 0 => Some("Rows of its rollouts are lost"),
             Status::Complete => None,
             Status::Running => Some("It is under way, or was killed"),
             Status::Aborted => Some("Somebody ended it early"),
@@ -206,9 +207,9 @@ impl View<'_> {
                 &self.of_balance(14, 14),
                 &format!("{} in each rollout", words::heading(&axis.label)),
                 format!(
-                    "The {} of each of {} of the {mode} session; their mean is {}.",
+                    "The {} of {} of the {mode} session; the mean is {}.",
                     axis.label,
-                    words::counted(values.len(), "rollout"),
+                    words::each(values.len(), "rollout"),
                     with_unit(task, average),
                     mode = mode.word(),
                 ),

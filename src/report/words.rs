@@ -94,6 +94,11 @@ pub(super) fn mean_of(label: &str) -> String {
     if label.starts_with("mean ") { label.to_owned() } else { format!("mean {label}") }
 }
 
+/// All of a count of things, one by one.
+pub(super) fn each(count: usize, noun: &str) -> String {
+    if count == 1 { format!("the one {noun}") } else { format!("each of {}", counted(count, noun)) }
+}
+
 /// A count with its noun.
 pub(super) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })

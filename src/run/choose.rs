@@ -221,18 +221,12 @@ fn attended<'a>(company: &'a Company, device: &str) -> Result<&'a Keys, RunError
 /// What the person did in the session in `folder`, to be done once more.
 fn recorded(folder: &Path, profile: &Profile, limit: f64) -> Result<Script, RunError> {
     let refused = |error: record::Error| {
-        RunError::Usage(format!("--operator script:{}: {error}", folder.display()))
+        RunError::Usage(match error {
+            record::Error::NoSession { .. } => format!("--operator script:{error}, or a table"),
+            other => format!("--operator script:{}: {other}", folder.display()),
+        })
     };
-    let file = folder.join("session.json");
-    if !file.exists() {
-        return Err(RunError::Usage(format!(
-            "--operator script:{}: this folder is no recorded session, for session.json is \
-             missing; give a session's folder, such as logs/S07/001-balance-simultaneous, or a \
-             table",
-            folder.display()
-        )));
-    }
-    let session = record::read_sidecar(&file).map_err(refused)?;
+    let session = record::sidecar_of(folder).map_err(refused)?;
     let task = profile.experiment.name();
     if session.task != task {
         return Err(RunError::Usage(format!(

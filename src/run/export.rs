@@ -35,7 +35,10 @@ fn how_to_build(form: Form) -> String {
 /// A disk that refuses is a failure, a file that does not read a wrong input.
 fn refused(error: Error) -> RunError {
     match error {
-        Error::Io { action: "read", .. } | Error::Cell { .. } | Error::Unfit { .. } => usage(error),
+        Error::Io { action: "read", .. }
+        | Error::Cell { .. }
+        | Error::Unfit { .. }
+        | Error::NoSession { .. } => usage(error),
         other => RunError::Failed(other.to_string()),
     }
 }

@@ -42,15 +42,7 @@ pub(super) fn replay(words: &cli::Replay) -> Result<ExitCode, RunError> {
 
 /// The facts and the profile of the session in `folder`.
 fn session(folder: &Path) -> Result<(Sidecar, Profile), RunError> {
-    let file = folder.join("session.json");
-    if !file.exists() {
-        return Err(RunError::Usage(format!(
-            "{}: this folder is no recorded session, for session.json is missing; give a \
-             session's folder, such as logs/S07/001-balance-simultaneous",
-            folder.display()
-        )));
-    }
-    let sidecar = record::read_sidecar(&file).map_err(|error| usage(&error))?;
+    let sidecar = record::sidecar_of(folder).map_err(|error| usage(&error))?;
     let profile = Document::from_text("session.json", sidecar.profile_ron.clone())
         .read()
         .map_err(|report| usage(&report))?;

@@ -16,8 +16,19 @@ pub struct Field {
 /// A centre and its metric.
 type Shape = (Vec<f64>, Vec<f64>);
 
-/// Directions in which an outline is traced.
-const DIRECTIONS: u32 = 36;
+/// Directions in which an outline is first traced.
+const DIRECTIONS: u32 = 24;
+
+/// Of neighbouring points further apart than this, in lengths that matter, the direction between
+/// is traced too: the tips of a long thin field have few directions.
+const APART: f64 = 0.1;
+
+/// How often a gap between two first directions is halved at most.
+const HALVINGS: u32 = 7;
+
+/// How far from the plane's middle an outline is followed, in lengths that matter: a field may reach
+/// for ever where nothing was ever seen.
+const REACH: f64 = 2.0;
 
 impl Field {
     /// The fields of `model`, those of its first output.
@@ -66,35 +77,75 @@ impl Field {
 
     /// Its outline around `middle` in a plane: `features` says what the learner sees at a point,
     /// where all that the plane does not show is as at the centre. `scale` is a length of each
-    /// axis that matters. Nothing where the middle lies outside.
+    /// axis that matters; a field that reaches beyond two of them is cut there. Nothing where the
+    /// middle lies outside.
     pub fn outline(
         &self,
         middle: (f64, f64),
         scale: (f64, f64),
         features: impl Fn((f64, f64)) -> Vec<f64>,
     ) -> Vec<(f64, f64)> {
-        let is_inside = |point| self.distance(&features(point)) < 1.0;
+        let is_inside = |(x, y): (f64, f64)| {
+            x.abs() < REACH * scale.0
+                && y.abs() < REACH * scale.1
+                && self.distance(&features((x, y))) < 1.0
+        };
         if self.norms.len() != self.centre.len() || !is_inside(middle) {
             return Vec::new();
         }
-        (0..=DIRECTIONS)
-            .map(|turn| {
-                let (sin, cos) = (TAU * f64::from(turn) / f64::from(DIRECTIONS)).sin_cos();
-                let at = |r: f64| (middle.0 + r * cos * scale.0, middle.1 + r * sin * scale.1);
-                // Far out, then halfway between inside and outside, again and again.
-                let (mut inside, mut outside) = (0.0, 1.0 / 64.0);
-                while outside < 4.0 && is_inside(at(outside)) {
-                    inside = outside;
-                    outside *= 1.5;
-                }
-                for _ in 0..14 {
-                    let half = f64::midpoint(inside, outside);
-                    if is_inside(at(half)) { inside = half } else { outside = half }
-                }
-                at(inside)
-            })
-            .collect()
+        let edge = |angle: f64| {
+            let (sin, cos) = angle.sin_cos();
+            let at = |r: f64| (middle.0 + r * cos * scale.0, middle.1 + r * sin * scale.1);
+            // Far out, then halfway between inside and outside, again and again.
+            let (mut inside, mut outside) = (0.0, 1.0 / 64.0);
+            while is_inside(at(outside)) {
+                inside = outside;
+                outside *= 1.5;
+            }
+            for _ in 0..14 {
+                let half = f64::midpoint(inside, outside);
+                if is_inside(at(half)) { inside = half } else { outside = half }
+            }
+            at(inside)
+        };
+        let angle = |turn: u32| TAU * f64::from(turn) / f64::from(DIRECTIONS);
+        let mut points = vec![edge(0.0)];
+        for turn in 0..DIRECTIONS {
+            let (from, to) = (angle(turn), angle(turn + 1));
+            follow(
+                &edge,
+                scale,
+                (from, points[points.len() - 1]),
+                (to, edge(to)),
+                HALVINGS,
+                &mut points,
+            );
+        }
+        points
     }
+}
+
+/// An angle and the point of an outline there.
+type Traced = (f64, (f64, f64));
+
+/// Puts the outline after `from` up to and with `to`, in steps that are small for the eye.
+fn follow(
+    edge: &impl Fn(f64) -> (f64, f64),
+    scale: (f64, f64),
+    from: Traced,
+    to: Traced,
+    halvings: u32,
+    points: &mut Vec<(f64, f64)>,
+) {
+    let apart = ((to.1.0 - from.1.0) / scale.0).hypot((to.1.1 - from.1.1) / scale.1);
+    if halvings == 0 || apart < APART {
+        points.push(to.1);
+        return;
+    }
+    let half = f64::midpoint(from.0, to.0);
+    let between = (half, edge(half));
+    follow(edge, scale, from, between, halvings - 1, points);
+    follow(edge, scale, between, to, halvings - 1, points);
 }
 
 /// D as a whole matrix, from that or from its diagonal.
@@ -118,12 +169,29 @@ mod tests {
             norms: vec![2.0, 10.0],
         };
         assert_eq!(field.centre(), [1.0, -10.0]);
-        let outline = field.outline((1.0, -10.0), (1.0, 1.0), |(x, y)| vec![x, y]);
+        let outline = field.outline((1.0, -10.0), (5.0, 10.0), |(x, y)| vec![x, y]);
         for (x, y) in &outline {
             let on = ((x - 1.0) / 1.0).powi(2) + ((y + 10.0) / 2.0).powi(2);
             assert!((on - 1.0).abs() < 1e-2, "{x} {y}: {on}");
         }
         assert!((outline[0].0 - 2.0).abs() < 1e-3);
-        assert!(field.outline((9.0, 9.0), (1.0, 1.0), |(x, y)| vec![x, y]).is_empty());
+        assert!(field.outline((9.0, 9.0), (5.0, 10.0), |(x, y)| vec![x, y]).is_empty());
+    }
+
+    /// Half-axes 0.1 and 100, of which two lengths are seen: its tips would be a few far points.
+    #[test]
+    fn a_long_thin_field_is_followed_in_small_steps_and_cut_where_nothing_was_seen() {
+        let field = Field {
+            centre: vec![0.0, 0.0],
+            metric: vec![100.0, 0.0, 0.0, 1e-4],
+            norms: vec![1.0; 2],
+        };
+        let outline = field.outline((0.0, 0.0), (1.0, 1.0), |(x, y)| vec![x, y]);
+        assert!(outline.iter().all(|(x, y)| x.abs() <= 0.1 && y.abs() <= 2.0));
+        assert!(outline.iter().any(|(_, y)| *y > 1.99), "it is cut at two lengths");
+        for pair in outline.windows(2) {
+            let step = (pair[1].0 - pair[0].0).hypot(pair[1].1 - pair[0].1);
+            assert!(step < 0.25, "a step of {step}");
+        }
     }
 }

@@ -45,6 +45,8 @@ pub struct Recorded {
     pub profile: BTreeMap<String, String>,
     /// Its rollouts, in order.
     pub rollouts: Vec<EpisodeRow>,
+    /// Rollouts that took place, but whose rows cannot be used or are gone.
+    pub lost: usize,
     /// What the policy of each tenth of main did alone: percent and rollout.
     pub tenths: Vec<(u8, EpisodeRow)>,
     /// What its step rows tell.
@@ -92,6 +94,7 @@ impl Recorded {
             resumed: sidecar.resumed.len(),
             profile,
             rollouts: Vec::new(),
+            lost: 0,
             tenths: Vec::new(),
             trace: Trace::default(),
             features: Vec::new(),
@@ -104,10 +107,13 @@ impl Recorded {
         self.left_out.push(LeftOut { path: path.display().to_string(), why: why.into() });
     }
 
-    fn mind_the_end(&mut self, path: &Path) {
-        if ends_in_half_a_row(path).unwrap_or(false) {
+    /// Names half a row at the end of `path`; whether there is one.
+    fn mind_the_end(&mut self, path: &Path) -> bool {
+        let is_cut = ends_in_half_a_row(path).unwrap_or(false);
+        if is_cut {
             self.leave_out(path, "its last row is cut off: half a row is left out");
         }
+        is_cut
     }
 
     fn read_rollouts(&mut self) -> Result<(), Error> {
@@ -122,12 +128,16 @@ impl Recorded {
                          it is left out"
                     );
                     self.leave_out(&path, why);
+                    self.lost += 1;
                 }
                 Err(error @ Error::Io { .. }) => return Err(error),
-                Err(error) => self.leave_out(&path, format!("{error}: the row is left out")),
+                Err(error) => {
+                    self.leave_out(&path, format!("{}: the row is left out", error.why()));
+                    self.lost += 1;
+                }
             }
         }
-        self.mind_the_end(&path);
+        self.lost += usize::from(self.mind_the_end(&path));
         Ok(())
     }
 
@@ -135,6 +145,15 @@ impl Recorded {
         let path = self.path.join("steps.csv");
         match Trace::read(&path, &self.rollouts, &plane(&self.task), points) {
             Ok((trace, spoilt)) => {
+                // Of a session that was killed the rollout under way has no row yet.
+                self.lost = self.lost.max(trace.unlisted);
+                let is_drawn = |row: &EpisodeRow| row.phase != Phase::Introduction;
+                if trace.portraits.is_empty()
+                    && spoilt.rows == 0
+                    && self.rollouts.iter().any(is_drawn)
+                {
+                    self.leave_out(&path, "it holds no rows: no figures of single ticks");
+                }
                 self.trace = trace;
                 if spoilt.rows > 0 {
                     let why = format!(
@@ -151,7 +170,9 @@ impl Recorded {
                 }
                 self.mind_the_end(&path);
             }
-            Err(error) => self.leave_out(&path, format!("{error}: no figures of single ticks")),
+            Err(error) => {
+                self.leave_out(&path, format!("{}: no figures of single ticks", error.why()));
+            }
         }
     }
 
@@ -175,7 +196,9 @@ impl Recorded {
                 }
                 self.mind_the_end(&path);
             }
-            Err(error) => self.leave_out(&path, format!("{error}: no figures of each tenth")),
+            Err(error) => {
+                self.leave_out(&path, format!("{}: no figures of each tenth", error.why()));
+            }
         }
     }
 
@@ -190,8 +213,15 @@ impl Recorded {
                 self.fields = Field::all(&learner);
                 self.features = features;
             }
-            Err(error) => self.leave_out(&path, format!("{error}: no receptive fields")),
+            Err(error) => self.leave_out(&path, format!("{}: no receptive fields", error.why())),
         }
+    }
+
+    /// Whether it went to its end and all its rollouts are known: only then it counts among
+    /// others.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.status == Status::Complete && self.lost == 0
     }
 
     /// What it is called: subject and trial.

@@ -27,6 +27,8 @@ pub struct Trace {
     pub closing: Vec<Acted>,
     /// Ticks of main.
     pub ticks: u64,
+    /// Rollouts of any phase that have ticks but no row in `episodes.csv`.
+    pub unlisted: usize,
 }
 
 /// Where the plant went, in the plane of the task's phase portraits.
@@ -105,6 +107,8 @@ struct Walk<'a> {
     /// Time of main before this rollout, s.
     offset: f64,
     last_t: f64,
+    /// Rollouts without a row in `episodes.csv`.
+    unlisted: usize,
 }
 
 impl Walk<'_> {
@@ -128,6 +132,7 @@ impl Walk<'_> {
         let row = found.and_then(|ahead| self.rows.get(self.row + ahead));
         self.is_discarded = row.is_some_and(|row| row.end == End::Discarded);
         self.row += found.map_or(0, |ahead| ahead + 1);
+        self.unlisted += usize::from(found.is_none());
         self.at = Some((phase, episode, step));
         self.last_t = 0.0;
     }
@@ -165,6 +170,7 @@ impl Trace {
             before: 0,
             offset: 0.0,
             last_t: 0.0,
+            unlisted: 0,
         };
         while let Some(row) = skim.next_row()? {
             let Some(phase) = row.phase() else { continue };
@@ -183,6 +189,7 @@ impl Trace {
             }
         }
         trace.closing = closing.into();
+        trace.unlisted = walk.unlisted;
         trace.regions.sort_by(|a, b| a.name.cmp(&b.name));
         Ok((trace, skim.spoilt()))
     }
@@ -293,6 +300,9 @@ mod tests {
         assert_eq!(times, [0.0, 0.02, 0.04, 0.06]);
         assert_eq!(trace.closing, trace.opening);
         assert_eq!(trace.regions[0].name, "all");
+        assert_eq!(trace.unlisted, 0);
+        let (short, _) = Trace::read(&path, &rows[..1], &plane("balance"), 100).unwrap();
+        assert_eq!(short.unlisted, 2);
     }
 
     #[test]

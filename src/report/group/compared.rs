@@ -134,6 +134,7 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
     let is_simulated =
         group.sessions.iter().all(|session| session.operator.starts_with("simulated"));
     let pairing = Pairing::of(&arms, is_simulated);
+    let yard = yardstick(group.task);
     let (mut rows, mut sentences, mut contrasts) = (Vec::new(), Vec::new(), Vec::new());
     for (name, of) in measures(group.task) {
         let [a, b] = pairing.values(&arms, |subject| subject.mean_of(of));
@@ -143,14 +144,18 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
         };
         let compared = compared.map(without_narrow_interval);
         if let Some(compared) = &compared {
+            let unit = match yard.unit {
+                "" => String::new(),
+                unit => format!(", in {unit}"),
+            };
             sentences.push(format!(
-                "{}, simultaneous against sequential: {compared}.",
+                "{}, simultaneous against sequential{unit}: {compared}.",
                 words::heading(&name)
             ));
             contrasts.push(Contrast {
                 preset: group.preset.clone(),
                 measure: name.clone(),
-                unit: yardstick(group.task).unit,
+                unit: yard.unit,
                 of: [Mode::Simultaneous, Mode::Sequential].map(Mode::word),
                 paired_by: pairing.word(),
                 comparison: *compared,
@@ -174,11 +179,13 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
         Pairing::Subjects => ("differences of subjects change their sign", ", paired by subject"),
         Pairing::Seeds => ("differences of seeds change their sign", ", paired by seed"),
     };
+    let less = if yard.more_is_better { "" } else { " Less is better." };
     let sentence = format!(
         "Simultaneous against sequential mode{paired}: means ± standard deviation over subjects, \
          medians, the difference of means with its 95 % interval (BCa bootstrap; from {LEAST_VALUES} \
-         subjects on, of fewer it would be too narrow), Hedges' g, and the chance p of such a difference if the mode did not matter. With few subjects p counts \
-         every way in which {few}; none of the rows is corrected for the others."
+         subjects on, of fewer it would be too narrow), Hedges' g, and the chance p of such a \
+         difference if the mode did not matter. With few subjects p counts every way in which {few}; \
+         none of the rows is corrected for the others.{less}"
     );
     let table = Table {
         caption: Caption {

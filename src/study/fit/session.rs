@@ -47,15 +47,10 @@ pub fn read(
     inputs: Option<&[String]>,
     outputs: Option<&[String]>,
 ) -> Result<Recorded, FitError> {
-    let file = folder.join("session.json");
-    if !file.exists() {
-        return Err(FitError::Unfit(format!(
-            "{} is no recorded session: session.json is missing; give a session's folder, such \
-             as logs/S07/001-balance-simultaneous, or a table",
-            folder.display()
-        )));
-    }
-    let sidecar = record::read_sidecar(&file)?;
+    let sidecar = record::sidecar_of(folder).map_err(|error| match error {
+        record::Error::NoSession { .. } => FitError::Unfit(format!("{error}, or a table")),
+        other => other.into(),
+    })?;
     let profile = Document::from_text("session.json", sidecar.profile_ron.clone()).read()?;
     let mut steps = reader::Steps::open(&folder.join("steps.csv"))?;
     let episodes =
