@@ -28,7 +28,7 @@ fn write_page(page: &mut String, report: &Report, version: &str) -> std::fmt::Re
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
          <title>{title} · coadapt</title><style>{}{STYLE}</style></head>\n<body>\n\
-         <header><h1>{title}</h1><p>Made by coadapt {} from the sessions' own files. Each figure \
+         <header><h1>{title}</h1><p>Made by coadapt {} from their own files. Each figure \
          and table names its preset; presets are never pooled.</p></header>\n",
         draw::style(),
         escaped(version)

@@ -195,7 +195,7 @@ impl<'a> Part<'a> {
         let what = &y.label;
         let sentence = format!(
             "The {} of the policies alone after each tenth of main, from the starts \
-             `{start}`, ± the standard error over the seeds.",
+             “{start}”, ± the standard error over the seeds.",
             words::mean_of(what)
         );
         let thesis = if is_first { "figure 45" } else { "like figure 45" };

@@ -324,6 +324,30 @@ mod tests {
         insta::assert_snapshot!("figure_120", shown(&mut pages, 120, 40));
     }
 
+    /// Four subjects' lines, which colours alone would tell apart, and means with their spread.
+    #[test]
+    fn subjects_have_signs_and_means_their_spread() {
+        let subject = |at: usize| {
+            let mark = [Mark::Line, Mark::Dashed, Mark::Dotted][at % 3];
+            let height = 5.0 * crate::report::figure::real(at);
+            let points = (0..=100).map(|x| (f64::from(x), height + 0.3 * f64::from(x)));
+            Series::new(format!("S{at}"), Role::One(at), mark, points.collect())
+        };
+        let mut means =
+            Series::new("mean ± sd", Role::Plain, Mark::Shape(0), vec![(50.0, 40.0), (75.0, 20.0)]);
+        means.spread = Some(vec![(35.0, 45.0), (10.0, 30.0)]);
+        let mut report = report();
+        report.sections[0].items = vec![Item::Figure(Figure {
+            caption: caption("figure", "figure 33"),
+            x: Axis::whole("rollout"),
+            y: Axis::new("success", "%"),
+            content: Content::Series((0..4).map(subject).chain([means]).collect()),
+        })];
+        let mut pages = Pages::new(&report);
+        pages.turn_to(2);
+        insta::assert_snapshot!("subjects_80", shown(&mut pages, 80, 24));
+    }
+
     #[test]
     fn keys_turn_pages_and_save_what_is_there() {
         let mut pages = Pages::new(&report());

@@ -100,7 +100,7 @@ impl Part<'_> {
         let (x, y) = self.plane();
         let sentence = format!(
             "The difference of normalised rewards from each of {} starts, averaged over the \
-             seeds: {}. Above 0 (red) the first of the two is better; colours end at ± 1.",
+             seeds: {}. Above 0 (orange) the first of the two is better; colours end at ± 1.",
             xs.len() * ys.len(),
             pair(sides)
         );

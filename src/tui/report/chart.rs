@@ -14,8 +14,10 @@ use crate::tui::text::{cut, wrapped};
 
 /// Above so many points of a series its spread would hide all else.
 const MOST_BARS: usize = 12;
-/// Steps between the dots of a dotted line, parts of the chart's width.
-const DOTS: f64 = 60.0;
+/// Points of a line from one sign of whose it is to the next.
+const SIGN_EVERY: usize = 20;
+/// What stands for the things of a kind.
+const SIGNS: [char; 6] = ['o', '^', 'x', '+', '*', '#'];
 
 /// Draws `figure` with heading, legend and sentence.
 pub(super) fn draw(pen: &mut Pen<'_>, figure: &Figure) {
@@ -66,9 +68,8 @@ fn spread_of(series: &Series) -> Option<&Vec<(f64, f64)>> {
     series.spread.as_ref().filter(is_drawn).filter(|spread| spread.len() <= MOST_BARS)
 }
 
-/// What stands for a series: its colour and its sign.
-fn look_of(series: &Series, at: usize, glyphs: Glyphs) -> (Role, Marker, char) {
-    const SIGNS: [char; 6] = ['o', '^', 'x', '+', '*', '#'];
+/// What stands for a series: its colour, what it is drawn with, and that as the legend has it.
+fn look_of(series: &Series, at: usize, glyphs: Glyphs) -> (Role, Marker, String) {
     let role = match series.role {
         Meaning::Simultaneous | Meaning::Machine => Role::Robot,
         Meaning::Sequential | Meaning::Human => Role::You,
@@ -77,18 +78,34 @@ fn look_of(series: &Series, at: usize, glyphs: Glyphs) -> (Role, Marker, char) {
             [Role::You, Role::Robot, Role::Go, Role::Countdown, Role::Wait, Role::Text][at % 6]
         }
     };
-    let line = if glyphs == Glyphs::Braille { Marker::Braille } else { Marker::Custom('.') };
+    let whose = sign_of(series);
+    let line = |fine: &str, coarse: char| match glyphs {
+        Glyphs::Braille => (role, Marker::Braille, format!("{fine}{}", text_of(whose))),
+        _ => (role, Marker::Custom(coarse), format!("{coarse}{}", text_of(whose))),
+    };
     match series.mark {
-        Mark::Line => (role, line, '─'),
-        Mark::Thin => (role, line, '·'),
-        Mark::Dashed => (role, Marker::Custom('-'), '-'),
-        Mark::Dotted => (role, Marker::Custom('\''), '\''),
+        Mark::Line => line("──", '.'),
+        Mark::Thin => line("─", '.'),
+        Mark::Dashed => line("╌╌", '-'),
+        Mark::Dotted => line("┈┈", '\''),
         Mark::Shape(shape) | Mark::Linked(shape) | Mark::DashLinked(shape) => {
             let sign =
                 SIGNS[(shape + usize::from(matches!(series.role, Meaning::One(_))) * at) % 6];
-            (role, Marker::Custom(sign), sign)
+            (role, Marker::Custom(sign), sign.to_string())
         }
     }
+}
+
+/// The sign of one of many whose lines colours alone would tell apart.
+fn sign_of(series: &Series) -> Option<char> {
+    match (series.role, series.mark) {
+        (Meaning::One(at), Mark::Line | Mark::Dashed | Mark::Dotted) => Some(SIGNS[at % 6]),
+        _ => None,
+    }
+}
+
+fn text_of(sign: Option<char>) -> String {
+    sign.map_or_else(String::new, String::from)
 }
 
 /// The legend's entries, line by line.
@@ -123,25 +140,37 @@ fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
     let ys = all().map(|point| point.1).chain(spreads.flat_map(|(a, b)| [*a, *b]));
     let (least, most) = bounds(&figure.y, ys);
     let y = (figure.ground().unwrap_or(least), most);
-    let mut drawn: Vec<Curve> = Vec::new();
+    let fine = Marker::Braille;
+    let dots = |marker: Marker| {
+        let (wide, high) = if marker == fine { (2, 4) } else { (1, 1) };
+        (f64::from(pen.width() * wide), f64::from(pen.height() * high))
+    };
+    // What is drawn later covers what was before: spreads lie below, signs above.
+    let (mut spreads, mut drawn, mut signs) = (Vec::new(), Vec::<Curve>::new(), Vec::new());
     for (at, one) in series.iter().enumerate() {
         let (role, marker, _) = look_of(one, at, pen.look.glyphs);
         let is_line = matches!(one.mark, Mark::Line | Mark::Thin);
         for piece in one.pieces() {
             let (kind, points) = match one.mark {
                 _ if is_line => (GraphType::Line, piece.to_vec()),
-                Mark::Dashed | Mark::Dotted => (GraphType::Scatter, dotted(piece, x)),
+                Mark::Dashed => (GraphType::Scatter, strokes(piece, (x, y), dots(marker), (4, 3))),
+                Mark::Dotted => (GraphType::Scatter, strokes(piece, (x, y), dots(marker), (1, 3))),
                 _ => (GraphType::Scatter, piece.to_vec()),
             };
             drawn.push((role, marker, kind, points));
         }
-        if let Some(spread) = spread_of(one) {
-            let ends = one.points.iter().zip(spread).filter(|(point, _)| point.1.is_finite());
-            let ends = ends.flat_map(|((x, _), (a, b))| [(*x, *a), (*x, *b)]).collect();
-            drawn.push((Role::Dim, Marker::Dot, GraphType::Scatter, ends));
+        if let Some(sign) = sign_of(one) {
+            let first = at * SIGN_EVERY / SIGNS.len();
+            let places = one.points.iter().skip(first).step_by(SIGN_EVERY).copied().collect();
+            signs.push((role, Marker::Custom(sign), GraphType::Scatter, places));
+        }
+        for ((x, _), (a, b)) in one.points.iter().zip(spread_of(one).into_iter().flatten()) {
+            let bar = if pen.look.glyphs == Glyphs::Braille { fine } else { Marker::Custom('|') };
+            spreads.push((Role::Dim, bar, GraphType::Line, vec![(*x, *a), (*x, *b)]));
         }
     }
-    let data = drawn.iter().map(|(role, marker, kind, points)| {
+    let layers = [&spreads, &drawn, &signs];
+    let data = layers.into_iter().flatten().map(|(role, marker, kind, points)| {
         Dataset::default().marker(*marker).graph_type(*kind).style(pen.style(*role)).data(points)
     });
     let area = pen.area();
@@ -152,17 +181,28 @@ fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
     chart.render(area, pen.buffer());
 }
 
-/// Points along `piece`, near enough to be taken for a line.
-fn dotted(piece: &[(f64, f64)], bounds: (f64, f64)) -> Vec<(f64, f64)> {
-    let apart = (bounds.1 - bounds.0) / DOTS;
+/// The dots of `piece` as strokes of `on` with gaps of `off` between them, where the picture between
+/// the `bounds` has so many `dots`.
+fn strokes(
+    piece: &[(f64, f64)],
+    bounds: ((f64, f64), (f64, f64)),
+    dots: (f64, f64),
+    (on, off): (usize, usize),
+) -> Vec<(f64, f64)> {
+    let dot = |(least, most): (f64, f64), dots: f64| (most - least) / dots.max(1.0);
+    let (wide, high) = (dot(bounds.0, dots.0), dot(bounds.1, dots.1));
     let mut points = Vec::new();
+    let mut passed = 0;
     for pair in piece.windows(2) {
         let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
-        points.push((x0, y0));
-        let mut x = x0 + apart;
-        while x < x1 {
-            points.push((x, y0 + (y1 - y0) * (x - x0) / (x1 - x0)));
-            x += apart;
+        let steps = ((x1 - x0) / wide).abs().max(((y1 - y0) / high).abs()).ceil().max(1.0);
+        let mut step = 0.0;
+        while step < steps {
+            if passed % (on + off) < on {
+                points.push((x0 + (x1 - x0) * step / steps, y0 + (y1 - y0) * step / steps));
+            }
+            passed += 1;
+            step += 1.0;
         }
     }
     points.extend(piece.last());
