@@ -88,6 +88,7 @@ impl<const CAPACITY: usize> Default for Row<CAPACITY> {
 
 impl<const CAPACITY: usize> std::ops::Deref for Row<CAPACITY> {
     type Target = [f64];
+    #[inline]
     fn deref(&self) -> &[f64] {
         &self.values[..usize::from(self.len)]
     }

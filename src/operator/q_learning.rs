@@ -75,18 +75,21 @@ impl Agent {
     }
 
     /// The cell that `state` lies in.
+    #[inline]
     #[must_use]
     pub fn cell(&self, state: &State) -> Cell {
         self.table.cell(state)
     }
 
     /// The throttle with the largest value in `cell`, the lowest of equals (eq. 34).
+    #[inline]
     #[must_use]
     pub fn best(&self, cell: Cell) -> Throttle {
         self.table.best(cell)
     }
 
     /// The best throttle, or now and then any (ε-greedy).
+    #[inline]
     pub fn choose(&self, cell: Cell, chance: &mut ChaCha8Rng) -> Throttle {
         if chance.random::<f64>() < self.params.epsilon {
             Throttle::ALL[chance.random_range(0..Throttle::ALL.len())]
@@ -96,6 +99,7 @@ impl Agent {
     }
 
     /// The value of `throttle` in `cell`: the return that is expected of it.
+    #[inline]
     #[must_use]
     pub fn value(&self, cell: Cell, throttle: Throttle) -> f64 {
         self.table.value(cell, throttle)
@@ -109,6 +113,7 @@ impl Agent {
 
     /// Learns that `throttle` in `cell` brought `reward` and led to the cell `next`, or to the
     /// end of everything (eq. 33). What is no number is not learned.
+    #[inline]
     pub fn learn(&mut self, cell: Cell, throttle: Throttle, reward: f64, next: Option<Cell>) {
         let to_come = next.map_or(0.0, |next| self.params.gamma * self.table.most(next));
         let error = reward + to_come - self.table.value(cell, throttle);

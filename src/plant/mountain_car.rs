@@ -70,6 +70,7 @@ impl MountainCar {
     }
 
     /// What the slope at `x` takes from v in a step.
+    #[inline]
     #[must_use]
     pub fn pull(&self, x: f64) -> f64 {
         self.params.gravity * (3.0 * x).cos()
@@ -77,6 +78,7 @@ impl MountainCar {
 
     /// A step from position `x`, where the slope's pull is `pull`, and velocity `v` with the
     /// throttle `u`.
+    #[inline]
     #[must_use]
     pub fn roll(&self, pull: f64, x: f64, v: f64, u: f64) -> (f64, f64) {
         let p = &self.params;
@@ -92,6 +94,7 @@ impl Plant for MountainCar {
         &Self::COLUMNS
     }
 
+    #[inline]
     fn step(&mut self, state: &State, action: Action) -> State {
         let &[x, v] = &state[..] else { return *state };
         let (x, v) = self.roll(self.pull(x), x, v, action.0);

@@ -60,6 +60,7 @@ impl Axis {
     }
 
     /// The cell that holds `at`; beyond the ends the last one on that side.
+    #[inline]
     fn cell(self, at: f64) -> usize {
         let cell = (at - self.from) / self.length * self.cells;
         #[expect(
@@ -96,6 +97,7 @@ impl Table {
         }
     }
 
+    #[inline]
     pub(super) fn cell(&self, state: &State) -> Cell {
         let &[x, v] = &state[..] else { return Cell(0) };
         Cell(self.position.cell(x) * self.row + self.velocity.cell(v))
@@ -105,17 +107,20 @@ impl Table {
         &self.values
     }
 
+    #[inline]
     pub(super) fn value(&self, cell: Cell, throttle: Throttle) -> f64 {
         self.values[cell.0][throttle as usize]
     }
 
     /// The largest value in `cell`.
+    #[inline]
     pub(super) fn most(&self, cell: Cell) -> f64 {
         let [back, rest, ahead] = self.values[cell.0];
         back.max(rest).max(ahead)
     }
 
     /// The throttle with that value, the lowest of equals.
+    #[inline]
     pub(super) fn best(&self, cell: Cell) -> Throttle {
         let [back, rest, ahead] = self.values[cell.0];
         if ahead > back.max(rest) {
@@ -128,19 +133,23 @@ impl Table {
     }
 
     /// Whether no throttle has a larger value.
+    #[inline]
     pub(super) fn is_best(&self, cell: Cell, throttle: Throttle) -> bool {
         self.value(cell, throttle) >= self.most(cell)
     }
 
+    #[inline]
     pub(super) fn add(&mut self, cell: Cell, throttle: Throttle, change: f64) {
         self.values[cell.0][throttle as usize] += change;
     }
 
     /// The place of a value among all.
+    #[inline]
     pub(super) const fn place(cell: Cell, throttle: Throttle) -> usize {
         cell.0 * Throttle::ALL.len() + throttle as usize
     }
 
+    #[inline]
     pub(super) fn add_at(&mut self, place: usize, change: f64) {
         self.values.as_flattened_mut()[place] += change;
     }
