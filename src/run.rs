@@ -1,6 +1,7 @@
 //! The composition root: the one room that knows every other.
 
 mod choose;
+mod curtain;
 mod devices;
 #[cfg(unix)]
 mod emulate;

@@ -4,16 +4,14 @@ mod words;
 
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal};
-use std::panic::{self, AssertUnwindSafe};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use serde::Serialize;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use super::shutdown::Shutdown;
+use super::curtain::shown_to;
 use super::words::{document, read};
-use super::{RunError, panics, say, signal_code};
+use super::{RunError, say};
 use crate::backend::serial::ports;
 use crate::cli;
 use crate::clock::{Clock, WallClock};
@@ -25,9 +23,8 @@ use crate::operator::gamepad::{Event, Pads};
 use crate::operator::terminal::Hands;
 use crate::profile::{Document, Profile};
 use crate::signal::Seconds;
-use crate::tui::app::End;
 use crate::tui::devices::{self, Bench, Devices, Survey, Terminal, gamepads};
-use crate::tui::terminal::{Abilities, Feed, KeysFrom, Screen, give_back, probe, speaks_unicode};
+use crate::tui::terminal::{Abilities, Feed, KeysFrom, Screen, probe, speaks_unicode};
 
 /// Where profiles are saved.
 const PROFILES: &str = "profiles";
@@ -134,13 +131,13 @@ fn add_terminal(survey: &mut Survey, asked: Option<Abilities>) {
 }
 
 /// The screen's view of the computer.
-struct Here {
+struct Here<'a> {
     computer: Computer,
     heard: Option<Inbox>,
-    shutdown: Shutdown,
+    is_over: &'a dyn Fn() -> bool,
 }
 
-impl Bench for Here {
+impl Bench for Here<'_> {
     fn survey(&mut self, heard: usize) -> Survey {
         let mut survey = self.computer.survey(heard);
         add_terminal(&mut survey, Abilities::known());
@@ -153,7 +150,7 @@ impl Bench for Here {
     }
 
     fn is_told_to_end(&self) -> bool {
-        self.shutdown.signal().is_some()
+        (self.is_over)()
     }
 }
 
@@ -171,20 +168,7 @@ fn on_screen(
         devices.hear_no_pads(why.as_str());
     }
     let heard = hub.as_ref().ok().map(|hub| hub.listen(clock.now()));
-    let mut here = Here { computer, heard, shutdown: Shutdown::listen() };
-    let mut screen =
-        Screen::take(feed, KeysFrom::Input).map_err(|error| RunError::Usage(error.to_string()))?;
-    let ended =
-        panic::catch_unwind(AssertUnwindSafe(|| devices::show(&mut screen, &mut here, devices)));
-    // A terminal that is gone lets even its farewell fail.
-    let _ = panic::catch_unwind(AssertUnwindSafe(|| drop(screen)));
-    give_back();
-    panics::tell_last_words();
-    Ok(match ended {
-        Ok(End::Quit) => ExitCode::SUCCESS,
-        Ok(End::Interrupted) => signal_code(SIGINT),
-        Ok(End::Signal) => signal_code(here.shutdown.signal().unwrap_or(SIGTERM)),
-        Ok(End::Lost) => signal_code(SIGHUP),
-        Err(_) => return Err(RunError::Failed("the screen failed".to_owned())),
+    shown_to(feed, |screen, is_over| {
+        devices::show(screen, &mut Here { computer, heard, is_over }, devices)
     })
 }

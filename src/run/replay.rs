@@ -1,27 +1,21 @@
 //! `coadapt replay`: a recorded session on the screen, or done once more and compared.
 
 use std::io::{self, IsTerminal};
-use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 use std::process::ExitCode;
 
-use serde::Serialize;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-
+use super::curtain::shown;
 use super::session::usage;
-use super::shutdown::Shutdown;
-use super::{RunError, panics, say, screen, signal_code, tell};
+use super::{RunError, say, screen, tell};
 use crate::cli;
-use crate::clock::WallClock;
 use crate::control::recording::Recording;
 use crate::operator::Choice;
-use crate::operator::terminal::{self, Hands};
 use crate::profile::{Document, Profile};
 use crate::record::{self, Sidecar, Status, folder};
 use crate::study::verify::{Difference, Verdict, VerifyError, verify};
-use crate::tui::app::End;
 use crate::tui::replay::{self, Player};
-use crate::tui::terminal::{Feed, KeysFrom, Screen, give_back, look};
+use crate::tui::terminal::{KeysFrom, Screen, look};
+use serde::Serialize;
 
 /// `coadapt replay …`
 pub(super) fn replay(words: &cli::Replay) -> Result<ExitCode, RunError> {
@@ -62,28 +56,6 @@ fn on_screen(folder: &Path, sidecar: &Sidecar, profile: &Profile) -> Result<Exit
     let player = Player::new(recording, screen::info_of(profile, sidecar), look);
     let frames_per_s = profile.screen.frames_per_s;
     shown(|screen, is_over| replay::show(screen, player, frames_per_s, is_over))
-}
-
-/// Takes the terminal, lets `show` draw there until it says how it ended, and gives it back.
-pub(super) fn shown(
-    show: impl FnOnce(&mut Screen, &dyn Fn() -> bool) -> End,
-) -> Result<ExitCode, RunError> {
-    let feed = Feed::new(Hands::new(&terminal::Params::default()), WallClock::start());
-    let shutdown = Shutdown::listen();
-    let mut screen = Screen::take(feed, KeysFrom::Input).map_err(|error| usage(&error))?;
-    let is_over = || shutdown.signal().is_some();
-    let ended = panic::catch_unwind(AssertUnwindSafe(|| show(&mut screen, &is_over)));
-    // A terminal that is gone lets even its farewell fail.
-    let _ = panic::catch_unwind(AssertUnwindSafe(|| drop(screen)));
-    give_back();
-    panics::tell_last_words();
-    Ok(match ended {
-        Ok(End::Quit) => ExitCode::SUCCESS,
-        Ok(End::Interrupted) => signal_code(SIGINT),
-        Ok(End::Signal) => signal_code(shutdown.signal().unwrap_or(SIGTERM)),
-        Ok(End::Lost) => signal_code(SIGHUP),
-        Err(_) => return Err(RunError::Failed("the screen failed".to_owned())),
-    })
 }
 
 /// The JSON object of `replay --verify`.

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use serde::Serialize;
 
-use super::replay::shown;
+use super::curtain::shown;
 use super::{RunError, progress, say, tell};
 use crate::cli;
 use crate::record::VERSION;

@@ -7,12 +7,11 @@ use std::process::ExitCode;
 use std::thread::JoinHandle;
 
 use super::outcome::Finished;
-use super::panics::{self, tell_later};
+use super::panics::tell_later;
 use super::plant::Real;
 use super::session::{Company, Keys, Session};
 use super::shutdown::Shutdown;
-use super::{RunError, exit_code, sentences, signal_code, tell};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use super::{RunError, curtain, exit_code, sentences, tell};
 
 use crate::cli;
 use crate::clock::WallClock;
@@ -26,12 +25,12 @@ use crate::session::plan::Plan;
 use crate::sharing::{self, Mode};
 use crate::task::Occasion;
 use crate::task::balance::Balance;
-use crate::tui::app::{self, Conductor, End, Running, Start};
+use crate::tui::app::{self, Conductor, Running, Start};
 use crate::tui::live::Info;
 use crate::tui::results;
 use crate::tui::scene::{self, Scene};
 use crate::tui::setup::Shelf;
-use crate::tui::terminal::{Feed, KeysFrom, Mouse, Screen, give_back, inside};
+use crate::tui::terminal::{Feed, KeysFrom, Mouse, Screen, inside};
 
 /// The folder of local profiles.
 const PROFILES: &str = "profiles";
@@ -71,10 +70,7 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
     let ended = panic::catch_unwind(AssertUnwindSafe(|| app::run(&mut screen, &mut stage, start)));
     // The plant first, then the log, then the terminal, then words.
     stage.stop();
-    // A terminal that is gone lets even its farewell fail.
-    let _ = panic::catch_unwind(AssertUnwindSafe(|| drop(screen)));
-    give_back();
-    panics::tell_last_words();
+    curtain::fall(screen);
     let ended = match ended {
         Ok(ended) => ended.map_err(RunError::Failed)?,
         Err(_) => {
@@ -86,14 +82,8 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
     if let Some(finished) = &stage.last {
         tell(&sentences(finished).join("\n"));
     }
-    let signal = stage.shutdown.signal();
-    Ok(match (ended, &stage.last) {
-        (End::Interrupted, _) => signal_code(SIGINT),
-        (End::Signal, _) => signal_code(signal.unwrap_or(SIGTERM)),
-        (End::Lost, _) => signal_code(SIGHUP),
-        (_, Some(finished)) => exit_code(finished),
-        (_, None) => ExitCode::SUCCESS,
-    })
+    let by_itself = || stage.last.as_ref().map_or(ExitCode::SUCCESS, exit_code);
+    Ok(curtain::code_of(ended, &stage.shutdown).unwrap_or_else(by_itself))
 }
 
 /// Where keys come from while standard input may hold a relay's lines.

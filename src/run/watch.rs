@@ -7,7 +7,7 @@ use std::rc::Rc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::Duration;
 
-use super::replay::shown;
+use super::curtain::shown;
 use super::session::{Session, usage};
 use super::{RunError, screen};
 use crate::cli;
