@@ -661,7 +661,8 @@ fn a_recorded_session_steers_once_more() {
     assert!(message.contains("a session of swing-up, not of balance"), "{message}");
     let refused = desk.run("run balance --headless --operator script:logs");
     assert_eq!(refused.status.code(), Some(2));
-    assert!(text(&refused.stderr).contains("session.json"), "{}", text(&refused.stderr));
+    let message = text(&refused.stderr);
+    assert!(message.contains("such as logs/") && message.contains("or a table"), "{message}");
 }
 
 #[test]

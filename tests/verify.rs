@@ -7,7 +7,6 @@ mod desk;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::thread;
 
 use coadapt::clock::{Clock, VirtualClock, WallClock};
 use coadapt::control::snapshot::{Command, Watcher};
@@ -15,8 +14,8 @@ use coadapt::operator::mouse::Pointer;
 use coadapt::operator::terminal::{Hands, Params};
 use coadapt::profile::Order;
 use coadapt::run::session::{Company, Keys, Session};
-use coadapt::session::Phase;
 use coadapt::session::machine::Stage;
+use coadapt::session::{Moment, Phase};
 use coadapt::signal::Seconds;
 use desk::{Desk, names, text};
 use serde_json::Value;
@@ -268,16 +267,8 @@ fn a_resumed_session_is_the_same_once_more() {
     };
     let session = Session::begin(&order, &Company::Headless).unwrap();
     let folder = session.folder().to_owned();
-    let (watcher, ender) = (session.watcher.clone(), session.watcher.clone());
-    // Ended in the middle of a rollout of main.
-    let other = thread::spawn(move || {
-        until(&watcher, |stage| {
-            stage.moment().is_none_or(|m| m.phase == Phase::Main && m.rollout >= 2 && m.step > 50)
-        });
-        ender.insist(Command::Abort("enough".to_owned()));
-    });
-    session.run(&mut VirtualClock::default(), || None).unwrap();
-    other.join().unwrap();
+    let watcher = session.watcher.clone();
+    session.run(&mut Busy { time: VirtualClock::default(), watcher }, || None).unwrap();
     assert!(fs::read_to_string(folder.join("episodes.csv")).unwrap().contains("aborted"));
     assert_verified(&desk, &folder);
     let session = Session::resume(&folder, &Company::Headless).unwrap();
@@ -287,12 +278,27 @@ fn a_resumed_session_is_the_same_once_more() {
     assert_verified(&desk, &folder);
 }
 
-/// Waits until the session is at a stage of which `is` says so.
-fn until(watcher: &Watcher, is: impl Fn(Stage) -> bool) {
-    let mut clock = WallClock::start();
-    while !is(watcher.look().stage) {
-        assert!(clock.now() < Seconds(60.0), "{:?}", watcher.look().stage);
-        clock.wait_until(clock.now() + Seconds(0.0002));
+/// The time of a person who leaves in the middle of a rollout of main.
+struct Busy {
+    time: VirtualClock,
+    watcher: Watcher,
+}
+
+impl Clock for Busy {
+    fn now(&self) -> Seconds {
+        self.time.now()
+    }
+
+    fn wait_until(&mut self, deadline: Seconds) -> Seconds {
+        let is_in_the_middle = |m: Moment| m.phase == Phase::Main && m.rollout >= 2 && m.step > 50;
+        if self.watcher.look().stage.moment().is_some_and(is_in_the_middle) {
+            self.watcher.insist(Command::Abort("enough".to_owned()));
+        }
+        self.time.wait_until(deadline)
+    }
+
+    fn is_wall(&self) -> bool {
+        self.time.is_wall()
     }
 }
 
