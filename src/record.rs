@@ -28,7 +28,7 @@ pub mod writer;
 
 pub use checkpoint::{Checkpoint, Momentum, Resumed};
 pub use document::{Document, read as read_document, write as write_document};
-pub use error::Error;
+pub use error::{Error, plain};
 pub use evaluation::EvaluationRow;
 pub use folder::Folder;
 pub use policy::{Policy, policy_text, read_policy};

@@ -119,6 +119,11 @@ fn what_was_recorded_is_never_written_over() {
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("choose another place"), "{}", text(&output.stderr));
     assert_eq!(fs::read(desk.at(rows)).unwrap(), before);
+    // Not even where the file that says what the rows are is gone.
+    fs::remove_file(desk.at("logs/S1/001-balance-simultaneous/session.json")).unwrap();
+    session(&desk, "balance", "S2", "simultaneous", 2);
+    let output = desk.run(&format!("report logs --out {rows}"));
+    assert_eq!((output.status.code(), fs::read(desk.at(rows)).unwrap()), (Some(2), before));
     // A page goes where it is sent, and a device stays one.
     assert!(desk.succeed("report logs --out /dev/stdout").contains("</html>"));
     desk.succeed("report logs --out page.html");
@@ -153,6 +158,24 @@ fn subjects_in_both_modes_are_paired_and_the_others_left_out_of_it() {
     assert!(report.contains("n = 3 pairs"), "{report}");
     assert!(report.contains("in one mode only: C1"), "{report}");
     assert!(!report.contains("BCa interval"), "three pairs are too few for one");
+}
+
+#[test]
+fn one_person_in_both_modes_does_not_undo_the_comparison_of_the_others() {
+    let desk = Desk::new();
+    for (subject, mode, seed) in [
+        ("A1", "sequential", 1),
+        ("A2", "sequential", 2),
+        ("B1", "simultaneous", 3),
+        ("B2", "simultaneous", 4),
+        ("C1", "sequential", 5),
+        ("C1", "simultaneous", 6),
+    ] {
+        session(&desk, "balance", subject, mode, seed);
+    }
+    let report = json(&desk, "report logs --json").to_string();
+    assert!(report.contains("n = 2 and 2"), "{report}");
+    assert!(report.contains("in both modes while most were in one: C1"), "{report}");
 }
 
 #[test]
@@ -296,28 +319,128 @@ fn a_session_that_was_cut_is_shown_but_counts_in_no_group() {
     assert!(thesis(&report).contains(&"figure 14".to_owned()));
 }
 
+/// What was left out: file and reason.
+fn left_out(report: &Value) -> Vec<String> {
+    let each = |left: &Value| {
+        format!("{}: {}", left["path"].as_str().unwrap(), left["why"].as_str().unwrap())
+    };
+    report["left_out"].as_array().unwrap().iter().map(each).collect()
+}
+
 #[test]
 fn a_complete_session_with_lost_rollouts_counts_in_no_group() {
     let desk = Desk::new();
     session(&desk, "balance", "S1", "simultaneous", 1);
     let folder = desk.at("logs/S1/001-balance-simultaneous");
-    let notes = || json(&desk, "report logs --json")["sections"][0]["notes"].to_string();
-    assert!(notes().contains("A subject counts once"), "{}", notes());
-    let episodes = folder.join("episodes.csv");
-    let whole = fs::read_to_string(&episodes).unwrap();
-    let last = whole.trim_end().rfind('\n').unwrap() + 1;
-    for broken in [&whole[..last], &format!("{whole}?"), &format!("{whole}@#\n")] {
+    let (episodes, steps) = (folder.join("episodes.csv"), folder.join("steps.csv"));
+    let (whole, ticks) =
+        (fs::read_to_string(&episodes).unwrap(), fs::read_to_string(&steps).unwrap());
+    let counts = |report: &Value| report["sections"].to_string().contains("A subject counts once");
+    let keep = |text: &str, is_kept: fn(&str) -> bool| {
+        text.lines().filter(|row| is_kept(row)).map(|row| format!("{row}\n")).collect::<String>()
+    };
+    // Cut at a row's end, in one table or both, or without a row at all: session.json knows better.
+    let early = |row: &str| !row.starts_with("main,9,") && !row.starts_with("main,1");
+    let cut = |row: &str| !row.starts_with("autonomous") && !row.starts_with("zero_control");
+    for (broken, steps_too, lost) in [
+        (keep(&whole, cut), true, "12 of 12 rollouts of autonomous are missing"),
+        (keep(&whole, early), false, "of 14 rollouts of main are missing"),
+        (
+            keep(&whole, |row| row.starts_with("phase")),
+            true,
+            "14 of 14 rollouts of main are missing",
+        ),
+    ] {
         fs::write(&episodes, broken).unwrap();
-        let notes = notes();
-        assert!(notes.contains("Rows of its rollouts are lost"), "{notes}");
-        assert!(notes.contains("counts in no group"), "{notes}");
+        fs::write(&steps, if steps_too { keep(&ticks, cut) } else { ticks.clone() }).unwrap();
+        let report = json(&desk, "report logs --json");
+        assert!(!counts(&report), "{report}");
+        let left = left_out(&report);
+        assert!(left.iter().any(|left| left.contains(lost)), "{lost}: {left:?}");
     }
-    // Rows of single ticks are not what a subject is counted by.
-    fs::write(&episodes, &whole).unwrap();
-    fs::write(folder.join("steps.csv"), "").unwrap();
+    // Nothing of a rollout is lost here; what is wrong is named all the same.
+    for (broken, said) in [
+        (format!("{whole}?"), "half a row"),
+        (format!("{whole}@#\n"), "the row is left out"),
+        (format!("{whole}{}\n", whole.lines().last().unwrap()), "stands there twice"),
+    ] {
+        fs::write(&episodes, broken).unwrap();
+        fs::write(&steps, &ticks).unwrap();
+        let report = json(&desk, "report logs --json");
+        assert!(counts(&report), "{said}: {report}");
+        assert!(left_out(&report).concat().contains(said), "{said}: {:?}", left_out(&report));
+    }
+}
+
+/// Rows of single ticks are not what a subject is counted by.
+#[test]
+fn spoilt_and_missing_ticks_are_named_and_the_session_counts() {
+    let desk = Desk::new();
+    session(&desk, "balance", "S1", "simultaneous", 1);
+    let steps = desk.at("logs/S1/001-balance-simultaneous/steps.csv");
+    let whole = fs::read_to_string(&steps).unwrap();
+    let middle = whole.match_indices('\n').nth(400).unwrap().0 + 1;
+    for (broken, said) in [
+        (String::new(), "the ticks of "),
+        (whole[..middle].to_owned(), "missing at its end"),
+        (whole.replacen("\nmain,3,5,", "\nmain,3x,5,", 1), "a row is"),
+        (whole.replacen("\nmain,3,5,", "\n\"main,3,5,", 1), "a row is"),
+        (whole.replacen("\nmain,3,5,0.1,", "\nmain,3,5,0.1\u{e9},", 1), "a row is"),
+    ] {
+        assert_ne!(broken, whole, "{said}");
+        fs::write(&steps, broken).unwrap();
+        let report = json(&desk, "report logs --json");
+        assert!(report["sections"].to_string().contains("A subject counts once"), "{report}");
+        let left = left_out(&report);
+        assert_eq!(left.len(), 1, "{left:?}");
+        assert!(left[0].contains(said), "{said}: {left:?}");
+    }
+}
+
+#[test]
+fn a_tenth_that_was_tried_from_few_starts_is_left_out() {
+    let desk = Desk::new();
+    session(&desk, "balance", "S1", "simultaneous", 1);
+    let table = desk.at("logs/S1/001-balance-simultaneous/evaluation.csv");
+    let whole = fs::read_to_string(&table).unwrap();
+    let last = whole.trim_end().rfind('\n').unwrap() + 1;
+    fs::write(&table, &whole[..last]).unwrap();
     let report = json(&desk, "report logs --json");
-    assert!(report["sections"][0]["notes"].to_string().contains("A subject counts once"));
-    assert!(report["left_out"][0]["why"].as_str().unwrap().contains("holds no rows"));
+    assert!(left_out(&report)[0].contains("after 100 % of main have fewer rows"), "{report}");
+    fs::write(&table, "").unwrap();
+    let report = json(&desk, "report logs --json");
+    assert!(left_out(&report)[0].contains("10 %, 20 %"), "{:?}", left_out(&report));
+    assert!(!thesis(&report).contains(&"figure 37".to_owned()));
+}
+
+#[cfg(unix)]
+#[test]
+fn links_lead_to_sessions_once_and_never_round() {
+    use std::os::unix::fs::symlink;
+    let desk = Desk::new();
+    session(&desk, "balance", "S1", "simultaneous", 1);
+    fs::create_dir(desk.at("mine")).unwrap();
+    symlink(desk.at("logs/S1"), desk.at("mine/first")).unwrap();
+    symlink(desk.at("logs/S1"), desk.at("mine/again")).unwrap();
+    symlink(desk.at("mine"), desk.at("mine/round")).unwrap();
+    let report = json(&desk, "report mine --json");
+    assert_eq!(report["sessions"].as_array().unwrap().len(), 1, "{report}");
+    assert_eq!(left_out(&report), [] as [String; 0]);
+}
+
+#[test]
+fn subjects_of_two_experiments_may_have_the_same_names() {
+    let desk = Desk::new();
+    for (gate, logs) in [("0.4", "logs/a"), ("0.6", "logs/b")] {
+        desk.succeed(&format!(
+            "run balance --headless --operator simulated:naive --subject P1 --seed 1 --rollouts 5 \
+             --phases main --set sharing.gate={gate} --logs {logs}"
+        ));
+    }
+    let report = json(&desk, "report logs --json");
+    assert_eq!(report["sessions"].as_array().unwrap().len(), 2);
+    assert_eq!(left_out(&report), [] as [String; 0]);
+    assert!(report["sections"].to_string().contains("sharing.gate 0.6"), "{report}");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The operating system refused.
-    #[error("cannot {action} {}: {cause}{}", path.display(), advice(cause.kind()))]
+    #[error("cannot {action} {}: {cause}{}", path.display(), advice(action, cause.kind()))]
     Io {
         /// What was tried, such as `write`.
         action: &'static str,
@@ -82,12 +82,17 @@ impl Error {
     /// What is wrong with the file or folder, without its name.
     #[must_use]
     pub fn why(&self) -> String {
-        let whole = self.to_string();
-        let rest = whole.strip_prefix(&self.path().display().to_string());
-        rest.map_or_else(
-            || whole.clone(),
-            |rest| rest.trim_start_matches([':', ',', ' ']).to_owned(),
-        )
+        match self {
+            Self::Io { action, cause, .. } => {
+                format!("cannot {action} it: {cause}{}", advice(action, cause.kind()))
+            }
+            other => {
+                let whole = other.to_string();
+                let name = other.path().display().to_string();
+                let rest = whole.strip_prefix(&name).unwrap_or(&whole);
+                rest.trim_start_matches([':', ',', ' ']).to_owned()
+            }
+        }
     }
 
     /// The file or folder that it is about.
@@ -108,8 +113,13 @@ impl Error {
     }
 }
 
-fn advice(kind: ErrorKind) -> &'static str {
+/// What to do next; where something cannot be read no other place helps.
+fn advice(action: &str, kind: ErrorKind) -> &'static str {
     match kind {
+        ErrorKind::PermissionDenied if action == "read" => {
+            "; ask its owner, or whom this computer is run by, for the right to read it"
+        }
+        _ if action == "read" => "",
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::WriteZero => {
             "; free some space, or choose a folder on another disk with --logs DIR"
         }
@@ -120,5 +130,36 @@ fn advice(kind: ErrorKind) -> &'static str {
             "; a file stands where a folder should be: move it, or choose another with --logs DIR"
         }
         _ => "",
+    }
+}
+
+/// What the system said, without the name of a temporary file that nobody asked for.
+#[must_use]
+pub fn plain(cause: &io::Error) -> io::Error {
+    let text = cause.to_string();
+    let said = text.split_once(" at path \"").map_or(&*text, |(said, _)| said);
+    io::Error::new(cause.kind(), said.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_may_not_be_read_has_no_advice_for_writers() {
+        let denied = || io::Error::from(ErrorKind::PermissionDenied);
+        let path = Path::new("logs/S1");
+        let read = Error::io("read", path)(denied());
+        assert!(read.to_string().contains("right to read") && !read.to_string().contains("--logs"));
+        assert!(read.why().starts_with("cannot read it: "), "{}", read.why());
+        assert!(Error::io("write", path)(denied()).to_string().contains("--logs"));
+        assert_eq!(Error::unfit(path, "it is empty").why(), "it is empty");
+    }
+
+    #[test]
+    fn the_name_of_a_temporary_file_is_not_told() {
+        let nowhere = tempfile::Builder::new().tempdir_in("/nowhere/at/all").unwrap_err();
+        assert!(nowhere.to_string().contains(".tmp"), "{nowhere}");
+        assert_eq!(plain(&nowhere).to_string(), "No such file or directory (os error 2)");
     }
 }

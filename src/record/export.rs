@@ -171,7 +171,7 @@ fn demand_nothing_at(out: &Path) -> Result<(), Error> {
 
 /// The disk refused an export; `cause` may name a place that nobody asked for.
 fn no_place(out: &Path, cause: &io::Error) -> Error {
-    Error::NoPlace { path: out.to_owned(), cause: cause.kind().into() }
+    Error::NoPlace { path: out.to_owned(), cause: super::plain(cause) }
 }
 
 /// `error`, of `out` where it was of a file in `place`, which the user does not know.

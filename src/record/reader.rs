@@ -146,7 +146,8 @@ impl Iterator for Episodes {
 /// # Errors
 /// When it cannot be read, is another kind of table, or a cell is wrong.
 pub fn read_events(path: &Path) -> Result<Vec<EventRow<String>>, Error> {
-    let mut lines = Lines::open(path, u64::MAX)?;
+    // A cause is a sentence, and may hold commas.
+    let mut lines = Lines::open_as(path, u64::MAX, true)?;
     lines.demand(&EVENT_COLUMNS)?;
     let mut rows = Vec::new();
     while let Some(read) = lines.advance() {
@@ -211,10 +212,16 @@ struct Lines {
 }
 
 impl Lines {
+    /// Opens the first `length` bytes of a table of numbers and words, where nothing is quoted: a
+    /// quotation mark would take in all that follows.
     fn open(path: &Path, length: u64) -> Result<Self, Error> {
+        Self::open_as(path, length, false)
+    }
+
+    fn open_as(path: &Path, length: u64, quoting: bool) -> Result<Self, Error> {
         let mut file = table::open_whole(path)?;
         file.set_limit(file.limit().min(length));
-        let mut table = csv::ReaderBuilder::new().flexible(true).from_reader(file);
+        let mut table = csv::ReaderBuilder::new().flexible(true).quoting(quoting).from_reader(file);
         let header = table.headers().cloned().map_err(|fault| misread(path, fault))?;
         Ok(Self { path: path.to_owned(), table, header, record: StringRecord::new() })
     }
@@ -265,6 +272,9 @@ fn misread(path: &Path, fault: csv::Error) -> Error {
     }
 }
 
+/// Letters of a problem that are told.
+const LONGEST: usize = 300;
+
 /// The cells of a line, from left to right.
 struct Cells<'a> {
     lines: &'a Lines,
@@ -281,11 +291,15 @@ impl<'a> Cells<'a> {
     /// A fault of the cell taken last.
     fn wrong(&self, problem: impl Into<String>) -> Error {
         let column = self.lines.header.get(self.index - 1).unwrap_or("?");
+        let problem: String = problem.into();
+        // A spoilt cell may be as long as the file.
+        let told: String = problem.chars().take(LONGEST).collect();
+        let more = if told.len() < problem.len() { "…" } else { "" };
         Error::Cell {
             path: self.lines.path.clone(),
             line: self.lines.record.position().map_or(0, csv::Position::line),
             column: column.to_owned(),
-            problem: problem.into(),
+            problem: format!("{told}{more}"),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -174,19 +175,19 @@ pub fn read_sidecar(path: &Path) -> Result<Sidecar, Error> {
 /// not read.
 pub fn sidecar_of(folder: &Path) -> Result<Sidecar, Error> {
     let file = folder.join(SESSION);
-    if file.is_file() {
-        return read_sidecar(&file);
-    }
+    let Err(missing) = fs::metadata(&file) else { return read_sidecar(&file) };
     let give = "give a session's folder, such as logs/S07/001-balance-simultaneous";
-    let why = if !folder.exists() {
-        format!("there is no such folder; {give}")
-    } else if let Some(session) = a_session_in(folder) {
-        format!(
-            "this folder is no recorded session but holds some; give one of them, such as {}",
-            session.display()
-        )
-    } else {
-        format!("this folder is no recorded session, for {SESSION} is missing; {give}")
+    let why = match (missing.kind(), fs::metadata(folder)) {
+        (ErrorKind::NotADirectory, _) => format!("this is a file; {give}"),
+        (ErrorKind::NotFound, Err(_)) => format!("there is no such folder; {give}"),
+        (ErrorKind::NotFound, Ok(_)) => match a_session_in(folder) {
+            Some(session) => format!(
+                "this folder is no recorded session but holds some; give one of them, such as {}",
+                session.display()
+            ),
+            None => format!("this folder is no recorded session, for {SESSION} is missing; {give}"),
+        },
+        _ => return Err(Error::io("read", &file)(missing)),
     };
     Err(Error::NoSession { path: folder.to_owned(), why })
 }
@@ -217,6 +218,9 @@ mod tests {
         let logs = tempfile::tempdir().unwrap();
         let refused = |folder: &Path| sidecar_of(folder).unwrap_err().to_string();
         assert!(refused(&logs.path().join("S9")).contains("no such folder"));
+        let file = logs.path().join("notes.txt");
+        fs::write(&file, "").unwrap();
+        assert!(refused(&file).contains("this is a file"));
         assert!(refused(logs.path()).contains("session.json is missing"));
         let session = logs.path().join("S1").join("001-balance-simultaneous");
         fs::create_dir_all(&session).unwrap();

@@ -70,8 +70,12 @@ impl Skim {
     /// When it cannot be read, or is another kind of table.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let file = table::open_whole(path)?;
-        let mut table =
-            csv::ReaderBuilder::new().flexible(true).buffer_capacity(1 << 17).from_reader(file);
+        let mut table = csv::ReaderBuilder::new()
+            .flexible(true)
+            // Nothing in it is quoted: a quotation mark would take in all that follows.
+            .quoting(false)
+            .buffer_capacity(1 << 17)
+            .from_reader(file);
         let header = table.byte_headers().map_err(|fault| misread(path, fault))?;
         let (before, after) = STEP_COLUMNS;
         let head: Vec<&[u8]> = header.iter().collect();
@@ -128,7 +132,12 @@ impl Skim {
             && self.record.iter().enumerate().skip(1).all(|(place, cell)| match cell {
                 _ if place == region => true,
                 [] => place >= before + self.state,
-                [b'-', digit, ..] | [digit, ..] => digit.is_ascii_digit(),
+                // The rollout and the step.
+                whole if place < 3 => whole.iter().all(u8::is_ascii_digit),
+                [b'-', number @ ..] | number => {
+                    number.first().is_some_and(u8::is_ascii_digit)
+                        && number.iter().all(|byte| b"0123456789.e-+".contains(byte))
+                }
             })
     }
 }
@@ -240,6 +249,9 @@ mod tests {
             "lunch,1,2,0.04,1.0,2.0,,,,,,,,,0,\n",
             "main,1,3,0.06,1.0,-inf,,,,,,,,,0,\n",
             "main,1,4,0.08,,2.0,,,,,,,,,0,\n",
+            "main,1x,4,0.08,1.0,2.0,,,,,,,,,0,\n",
+            "main,1,4,0.0.8?,1.0,2.0,,,,,,,,,0,\n",
+            "\"main,1,4,0.08,1.0,2.0,,,,,,,,,0,\n",
         ];
         let (_folder, skim) = skim(&format!("{HEAD}{good}{}{good}main,1,5,0.1,1.", rows.concat()));
         let mut skim = skim.unwrap();
@@ -247,7 +259,7 @@ mod tests {
         while skim.next_row().unwrap().is_some() {
             good_rows += 1;
         }
-        assert_eq!((good_rows, skim.spoilt()), (2, Spoilt { rows: 5, first_line: 3 }));
+        assert_eq!((good_rows, skim.spoilt()), (2, Spoilt { rows: 8, first_line: 3 }));
     }
 
     #[test]

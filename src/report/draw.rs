@@ -18,7 +18,7 @@ use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 use kuva::render::theme::Theme;
 
-use super::figure::{Axis, Cells, Content, Figure, Mark, Role, Series};
+use super::figure::{Axis, Cells, Content, Figure, Mark, Role, SHAPES, Series};
 
 /// Width of a figure: small enough that its text is legible on a phone.
 const WIDTH: f64 = 480.0;
@@ -112,7 +112,7 @@ const fn dashes(mark: Mark) -> (Option<&'static str>, f64) {
 }
 
 const fn marker(shape: usize) -> MarkerShape {
-    match shape % 6 {
+    match shape % SHAPES {
         0 => MarkerShape::Circle,
         1 => MarkerShape::Triangle,
         2 => MarkerShape::Square,

@@ -22,6 +22,9 @@ pub enum Role {
     One(usize),
 }
 
+/// How many shapes can be told apart.
+pub const SHAPES: usize = 6;
+
 /// How a series is drawn. Shapes and dashes say what colours say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -7,6 +7,7 @@ mod trace;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -38,8 +39,8 @@ pub struct Found {
 enum Kind {
     Session,
     Study,
-    /// A session without its `session.json`.
-    Headless,
+    /// A session or a study without the file that says what it is.
+    Headless(&'static str),
     /// Something with folders in it.
     Shelf(Vec<PathBuf>),
 }
@@ -50,7 +51,8 @@ pub fn find(folders: &[PathBuf]) -> Found {
     let mut found = Found::default();
     for folder in folders {
         let before = (found.sessions.len() + found.studies.len(), found.left_out.len());
-        let is_there = look(folder, DEPTH, &mut found);
+        // A folder that was named is looked through, also where another led to it before.
+        let is_there = look(folder, DEPTH, &mut BTreeSet::new(), &mut found);
         let after = (found.sessions.len() + found.studies.len(), found.left_out.len());
         if is_there && before == after {
             let why = "there is no session and no study in it; name a session's folder, or one \
@@ -62,31 +64,43 @@ pub fn find(folders: &[PathBuf]) -> Found {
         let mut seen = BTreeSet::new();
         paths.sort();
         // One folder may be named in several ways.
-        paths.retain(|path| seen.insert(fs::canonicalize(path).unwrap_or_else(|_| path.clone())));
+        paths.retain(|path| seen.insert(itself(path)));
     };
     once(&mut found.sessions);
     once(&mut found.studies);
     found
 }
 
-/// Looks at `folder` and below it; whether it could be read.
-fn look(folder: &Path, depth: u32, found: &mut Found) -> bool {
+/// The folder that `path` leads to, through all links.
+fn itself(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
+}
+
+/// Looks at `folder` and below it; whether it could be read. Links may lead round and round: no
+/// folder is `seen` twice.
+fn look(folder: &Path, depth: u32, seen: &mut BTreeSet<PathBuf>, found: &mut Found) -> bool {
+    if !seen.insert(itself(folder)) {
+        return true;
+    }
     match kind(folder) {
         Ok(Kind::Session) => found.sessions.push(folder.to_owned()),
         Ok(Kind::Study) => found.studies.push(folder.to_owned()),
-        Ok(Kind::Headless) => {
-            let why = "its session.json is missing, so nobody knows what its rows are";
-            found.leave_out(folder, why);
+        Ok(Kind::Headless(missing)) => {
+            let why = format!("its {missing} is missing, so nobody knows what its rows are");
+            found.leave_out(folder, &why);
         }
         Ok(Kind::Shelf(below)) if below.is_empty() && depth < DEPTH => {
             found.leave_out(folder, "it holds no session and no study");
         }
         Ok(Kind::Shelf(below)) if depth > 0 => {
             for folder in below {
-                look(&folder, depth - 1, found);
+                look(&folder, depth - 1, seen, found);
             }
         }
-        Ok(Kind::Shelf(_)) => {}
+        Ok(Kind::Shelf(below)) if below.is_empty() => {}
+        Ok(Kind::Shelf(_)) => {
+            found.leave_out(folder, "folders so deep are not looked through; name it itself");
+        }
         Err(error) => {
             let why = format!("it cannot be read ({error}); name the folder of a session or study");
             found.leave_out(folder, &why);
@@ -96,22 +110,32 @@ fn look(folder: &Path, depth: u32, found: &mut Found) -> bool {
     true
 }
 
-fn kind(folder: &Path) -> std::io::Result<Kind> {
-    let has = |name: &str| folder.join(name).is_file();
+/// Whether something was recorded in `folder`, which stays as it is.
+#[must_use]
+pub fn holds_records(folder: &Path) -> bool {
+    !matches!(kind(folder), Ok(Kind::Shelf(_)) | Err(_))
+}
+
+fn kind(folder: &Path) -> io::Result<Kind> {
+    let has = |name: &str| match fs::metadata(folder.join(name)) {
+        Ok(there) => Ok(there.is_file()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    };
     let mut below = Vec::new();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let is_hidden = entry.file_name().as_encoded_bytes().starts_with(b".");
-        // No links: they may lead round and round.
-        if !is_hidden && entry.file_type()?.is_dir() {
+        if !is_hidden && entry.path().is_dir() {
             below.push(entry.path());
         }
     }
     below.sort();
     Ok(match () {
-        () if has("session.json") => Kind::Session,
-        () if has("study.json") => Kind::Study,
-        () if has("steps.csv") || has("episodes.csv") => Kind::Headless,
+        () if has("session.json")? => Kind::Session,
+        () if has("study.json")? => Kind::Study,
+        () if has("steps.csv")? || has("episodes.csv")? => Kind::Headless("session.json"),
+        () if has("results.csv")? && folder.join("runs").is_dir() => Kind::Headless("study.json"),
         () => Kind::Shelf(below),
     })
 }
@@ -183,9 +207,10 @@ pub fn gather(found: Found, told: &(dyn Fn() + Sync)) -> Gathered {
 fn one_of_each_trial(sessions: Vec<Recorded>, left_out: &mut Vec<LeftOut>) -> Vec<Recorded> {
     let mut trials = BTreeMap::<_, Vec<Recorded>>::new();
     for session in sessions {
-        let Recorded { subject, trial, task, preset, mode, .. } = &session;
         // Folders of several experiments count their trials each by itself.
-        let key = (subject.clone(), *trial, task.clone(), preset.clone(), mode.word());
+        let Recorded { subject, trial, task, preset, mode, operator, profile, .. } = &session;
+        let experiment = (task.clone(), preset.clone(), operator.clone(), profile.clone());
+        let key = (experiment, subject.clone(), *trial, mode.word());
         trials.entry(key).or_default().push(session);
     }
     let mut kept = Vec::new();

@@ -5,8 +5,9 @@
 
 mod compared;
 mod tables;
+mod tenths;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::achieved::{Achieved, yardstick};
 use super::figure::{
@@ -15,9 +16,7 @@ use super::figure::{
 use super::gather::Recorded;
 use super::metrics::{deviation, mean};
 use super::series::{ByRollout, WINDOW, along, moving_average, numbers, over_rows, with_gaps};
-use super::session::{
-    line, linked, measure, measured, numbered, of_main, role, shape, subject, with_unit,
-};
+use super::session::{line, linked, measure, measured, numbered, of_main, role, shape, with_unit};
 use super::words;
 use crate::record::EpisodeRow;
 use crate::session::Phase;
@@ -39,9 +38,6 @@ pub struct Group<'a> {
     /// Sessions that are not complete.
     pub cut: Vec<&'a Recorded>,
 }
-
-/// A subject, and its means by percent of main.
-type Tenths<'a> = (&'a str, BTreeMap<u8, f64>);
 
 /// A subject in one mode.
 #[derive(Clone, Debug)]
@@ -75,18 +71,6 @@ fn last_average(session: &Recorded) -> Option<f64> {
     let values = numbers(&measured(session));
     let last = &values[values.len().saturating_sub(WINDOW)..];
     (!last.is_empty()).then(|| mean(last))
-}
-
-/// What the policy of each tenth is measured by alone: percent and mean.
-fn tenths(session: &Recorded) -> BTreeMap<u8, f64> {
-    let mut rows: BTreeMap<u8, Vec<&EpisodeRow>> = BTreeMap::new();
-    for (percent, row) in &session.tenths {
-        rows.entry(*percent).or_default().push(row);
-    }
-    let mean_of = |(percent, rows): (u8, Vec<&EpisodeRow>)| {
-        Some((percent, Achieved::of(&session.task, &rows).mean()?))
-    };
-    rows.into_iter().filter_map(mean_of).collect()
 }
 
 /// The part of a report that shows `group`, and its comparisons.
@@ -381,99 +365,6 @@ impl<'a> Group<'a> {
                 ..Axis::new("subject, from worst to best", "")
             },
             y: Axis { range: None, ..axis },
-            content: Content::Series(series),
-        })
-    }
-
-    /// Each subject's means after each tenth, by mode.
-    fn after_tenths(&self) -> Vec<(Mode, Vec<Tenths<'a>>)> {
-        let arms = self.arms().into_iter().map(|(mode, arm)| {
-            let known = arm.iter().map(|subject| {
-                let each: Vec<BTreeMap<u8, f64>> =
-                    subject.sessions.iter().map(|session| tenths(session)).collect();
-                let percents: BTreeSet<u8> =
-                    each.iter().flat_map(BTreeMap::keys).copied().collect();
-                let at = |percent: u8| {
-                    let values: Vec<f64> =
-                        each.iter().filter_map(|one| one.get(&percent)).copied().collect();
-                    (percent, mean(&values))
-                };
-                (subject.name, percents.into_iter().map(at).collect::<BTreeMap<_, _>>())
-            });
-            (mode, known.filter(|(_, tenths)| !tenths.is_empty()).collect::<Vec<_>>())
-        });
-        arms.filter(|(_, known)| !known.is_empty()).collect()
-    }
-
-    fn each_tenth(&self) -> Option<Figure> {
-        let axis = measure(self.task);
-        let mut series = Vec::new();
-        for (mode, subjects) in self.after_tenths() {
-            for (at, (name, tenths)) in subjects.into_iter().enumerate() {
-                let points = tenths.into_iter().map(|(percent, v)| (f64::from(percent), v));
-                let label = format!("{name} ({})", mode.word());
-                let role = role(mode);
-                series.push(Series::new(label, role, subject(mode, at), points.collect()));
-            }
-        }
-        let sentence = format!(
-            "The {} of each subject's robot alone after each tenth of main; colours and lines \
-             tell the groups apart, shapes the subjects.",
-            words::mean_of(&axis.label)
-        );
-        let title = format!("{} of the robot alone after each tenth", words::heading(&axis.label));
-        (!series.is_empty()).then(|| Figure {
-            caption: self.caption("tenths", 37, &title, sentence),
-            x: Axis::new("part of main", "%").from(0.0, 100.0),
-            y: Axis { range: None, ..axis },
-            content: Content::Series(series),
-        })
-    }
-
-    fn improvement(&self) -> Option<Figure> {
-        let axis = measure(self.task);
-        // A ratio says nothing of heights, which may be negative, nor of steps that shall be few.
-        let by_ratio = axis.range.is_none() && yardstick(self.task).more_is_better;
-        let sign = if yardstick(self.task).more_is_better { 1.0 } else { -1.0 };
-        let (mut series, mut told) = (Vec::new(), Vec::new());
-        for (mode, subjects) in self.after_tenths() {
-            let percents: BTreeSet<u8> =
-                subjects.iter().flat_map(|(_, t)| t.keys()).copied().collect();
-            let means: Vec<(f64, f64)> = percents
-                .into_iter()
-                .map(|percent| {
-                    let values: Vec<f64> =
-                        subjects.iter().filter_map(|(_, t)| t.get(&percent)).copied().collect();
-                    (f64::from(percent), mean(&values))
-                })
-                .collect();
-            let first = means.first()?.1;
-            let better = |value: f64| {
-                if by_ratio { 100.0 * (value / first - 1.0) } else { sign * (value - first) }
-            };
-            let points: Vec<(f64, f64)> = means.iter().map(|(x, y)| (*x, better(*y))).collect();
-            if let Some((_, last)) = points.last() {
-                let last =
-                    if by_ratio { format!("{last:.0} %") } else { with_unit(self.task, *last) };
-                told.push(format!("{} {last}", mode.word()));
-            }
-            series.push(Series::new(mode.word(), role(mode), linked(mode), points));
-        }
-        let sentence = format!(
-            "How much better the mean of each group's robots alone is than after the first tenth \
-             of main; at the end {}.",
-            told.join(", ")
-        );
-        let title = "Improvement of the robot alone over the first tenth";
-        let y = if by_ratio {
-            Axis::new("improvement", "%")
-        } else {
-            Axis::new(format!("improvement of {}", axis.label), axis.unit)
-        };
-        (!series.is_empty()).then(|| Figure {
-            caption: self.caption("improvement", 38, title, sentence),
-            x: Axis::new("part of main", "%").from(0.0, 100.0),
-            y,
             content: Content::Series(series),
         })
     }

@@ -28,7 +28,7 @@ fn write_page(page: &mut String, report: &Report, version: &str) -> std::fmt::Re
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
          <title>{title} · coadapt</title><style>{}{STYLE}</style></head>\n<body>\n\
-         <header><h1>{title}</h1><p>Made by coadapt {} from their own files. Each figure \
+         <header><h1>{title}</h1><p>Made by coadapt {} from what sessions and studies left. Each figure \
          and table names its preset; presets are never pooled.</p></header>\n",
         draw::style(),
         escaped(version)
@@ -67,7 +67,9 @@ fn write_left_out(page: &mut String, report: &Report) -> std::fmt::Result {
 fn write_section(page: &mut String, section: &Section, at: usize, folds: bool) -> std::fmt::Result {
     let title = escaped(&section.title);
     // A group, a study or both modes of a subject is what one came for.
-    let is_open = !folds || ["Group", "Study"].iter().any(|word| section.title.starts_with(word));
+    let is_wanted = ["Group", "Study"].iter().any(|word| section.title.starts_with(word))
+        || section.title.ends_with("both modes");
+    let is_open = !folds || is_wanted;
     let open = if is_open { " open" } else { "" };
     writeln!(page, "<details id=\"part-{at}\"{open}><summary><h2>{title}</h2></summary>")?;
     for note in &section.notes {

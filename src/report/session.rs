@@ -284,18 +284,19 @@ impl View<'_> {
         let points = self.at_ends(|row| row.share);
         let last = points.last()?.1;
         let what = match mode {
-            Mode::Simultaneous => "100 % is the person alone, 0 % the robot alone",
-            Mode::Sequential => "the robot only watches, so it is 100 % throughout",
+            Mode::Simultaneous => {
+                format!("100 % is the person alone, 0 % the robot alone; {last:.0} % at the end")
+            }
+            Mode::Sequential => {
+                format!("the robot only watches, so it is {last:.0} % throughout")
+            }
         };
         Some(Figure {
             caption: self.caption(
                 "share",
                 &self.of_balance(17, 17),
                 "The person's share w",
-                format!(
-                    "The mixing weight at the end of each rollout of main: {what}; {last:.0} % at \
-                     the end."
-                ),
+                format!("The mixing weight at the end of each rollout of main: {what}."),
             ),
             x: Axis::whole("rollout"),
             y: Axis::new("person's share w", "%").from(0.0, 100.0),

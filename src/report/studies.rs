@@ -282,8 +282,9 @@ impl<'a> Part<'a> {
             let points = points.map(|p| (f64::from(p.episode), 100.0 * of(p))).collect();
             let series =
                 Series::new("best simultaneous run", Role::Simultaneous, Mark::Line, points);
-            let sentence =
-                format!("The {label} during main in the best simultaneous run (run {run}).");
+            let sentence = format!(
+                "The {label} during main in the best simultaneous run (run {run} of the plan)."
+            );
             (vec![series], sentence, thesis.to_owned())
         } else {
             let mut arms: BTreeMap<&str, BTreeMap<u32, Vec<f64>>> = BTreeMap::new();

@@ -37,7 +37,7 @@ pub(super) fn replay(words: &cli::Replay) -> Result<ExitCode, RunError> {
 /// The facts and the profile of the session in `folder`.
 fn session(folder: &Path) -> Result<(Sidecar, Profile), RunError> {
     let sidecar = record::sidecar_of(folder).map_err(|error| usage(&error))?;
-    let profile = Document::from_text("session.json", sidecar.profile_ron.clone())
+    let profile = Document::from_text("profile_ron of session.json", sidecar.profile_ron.clone())
         .read()
         .map_err(|report| usage(&report))?;
     Ok((sidecar, profile))
@@ -153,11 +153,16 @@ fn sentences(folder: &Path, sidecar: &Sidecar, verdict: &Verdict) -> Vec<String>
             "the recording lost {lost} rows, without which what follows them cannot be repeated"
         ));
     }
-    if difference.is_none() && sidecar.status == Status::Running {
-        let still = if folder::is_busy(folder) { "still runs" } else { "was cut" };
-        lines.push(format!("the session {still}: this is as far as it goes"));
-    } else if difference.is_none() && verdict.partial {
-        lines.push("a table ends before the session does: this is as far as it goes".to_owned());
+    let end = match sidecar.status {
+        Status::Running if folder::is_busy(folder) => Some("the session still runs"),
+        Status::Running => Some("the session was cut"),
+        Status::Complete if verdict.partial => Some("a table ends before the session does"),
+        Status::Complete => None,
+        _ if verdict.partial => Some("the session ended early"),
+        _ => None,
+    };
+    if let (None, Some(end)) = (&difference, end) {
+        lines.push(format!("{end}: this is as far as it goes"));
     }
     lines
 }

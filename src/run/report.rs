@@ -10,10 +10,10 @@ use serde::Serialize;
 use super::curtain::shown;
 use super::{RunError, progress, say, tell};
 use crate::cli;
-use crate::record::VERSION;
+use crate::record::{self, VERSION};
 use crate::report::compose::compose;
 use crate::report::figure::{Item, Report};
-use crate::report::gather::{Gathered, find, gather};
+use crate::report::gather::{Gathered, find, gather, holds_records};
 use crate::report::{draw, html, text};
 use crate::tui::report::{Bench, Pages, show};
 use crate::tui::terminal::{KeysFrom, Screen};
@@ -113,7 +113,7 @@ fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    if ["session.json", "study.json"].iter().any(|name| folder.join(name).exists()) {
+    if holds_records(folder) {
         return Err(RunError::Usage(format!(
             "{} holds a session or a study, whose files stay as they are: choose another place",
             folder.display()
@@ -144,6 +144,7 @@ fn for_all<'a, 'b, 'c>(
 }
 
 fn failed(action: &str, path: &Path, error: &io::Error) -> RunError {
+    let error = record::plain(error);
     let hint = "choose a place that is there and that you may write to";
     RunError::Failed(format!("cannot {action} {}: {error}; {hint}", path.display()))
 }

@@ -30,7 +30,7 @@ use crate::tui::live::Info;
 use crate::tui::results;
 use crate::tui::scene::{self, Scene};
 use crate::tui::setup::Shelf;
-use crate::tui::terminal::{Feed, KeysFrom, Mouse, Screen, inside};
+use crate::tui::terminal::{Feed, KeysFrom, Mouse, NoScreen, Screen, inside};
 
 /// The folder of local profiles.
 const PROFILES: &str = "profiles";
@@ -51,7 +51,7 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
         }
         Some(run) => {
             // Without a terminal no folder is made.
-            Screen::check(keys).map_err(|error| RunError::Usage(error.to_string()))?;
+            Screen::check(keys).map_err(|error| no_screen(&error))?;
             let started = match &run.resume {
                 Some(folder) => stage.take_up(folder)?,
                 None => stage
@@ -64,7 +64,7 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
         Ok(screen) => screen,
         Err(error) => {
             stage.stop();
-            return Err(RunError::Usage(error.to_string()));
+            return Err(no_screen(&error));
         }
     };
     let ended = panic::catch_unwind(AssertUnwindSafe(|| app::run(&mut screen, &mut stage, start)));
@@ -84,6 +84,12 @@ pub(super) fn screen(run: Option<&cli::Run>) -> Result<ExitCode, RunError> {
     }
     let by_itself = || stage.last.as_ref().map_or(ExitCode::SUCCESS, exit_code);
     Ok(curtain::code_of(ended, &stage.shutdown).unwrap_or_else(by_itself))
+}
+
+/// A session needs none.
+fn no_screen(error: &NoScreen) -> RunError {
+    let how = "coadapt run balance --headless --operator simulated:average";
+    RunError::Usage(format!("{error}, or run a session without a screen: {how}"))
 }
 
 /// Where keys come from while standard input may hold a relay's lines.

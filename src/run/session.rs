@@ -208,9 +208,10 @@ impl Session {
         let folder = Folder::open(path).map_err(failed)?;
         // Everything that could be refused is looked at before the folder is touched.
         let sidecar = record::read_sidecar(&path.join("session.json")).map_err(failed)?;
-        let profile = Document::from_text("session.json", sidecar.profile_ron.clone())
-            .read()
-            .map_err(|report| RunError::Usage(report.to_string()))?;
+        let profile =
+            Document::from_text("profile_ron of session.json", sidecar.profile_ron.clone())
+                .read()
+                .map_err(|report| RunError::Usage(report.to_string()))?;
         let choice: Choice =
             sidecar.operator.parse().map_err(|e: operator::UnknownOperator| usage(&e))?;
         if let Choice::Gamepad(Via::Script(file)) = &choice {

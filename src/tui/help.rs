@@ -32,7 +32,11 @@ pub fn draw(pen: &mut Pen<'_>, screen: Screen, hand: Hand, notes: &[String]) {
         y += 1;
     }
     page.text(0, y, "Ctrl-C", Role::Strong);
-    let quits = if matches!(screen, Screen::Replay | Screen::Watch) { "quit" } else { QUITS };
+    let quits = if matches!(screen, Screen::Replay | Screen::Watch | Screen::Report) {
+        "quit"
+    } else {
+        QUITS
+    };
     page.text(shown + 3, y, quits, Role::Text);
     y += 2;
     for line in lines {

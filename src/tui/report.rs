@@ -42,6 +42,8 @@ pub enum Reaction {
     Stay,
     /// Leave the screen.
     Quit,
+    /// Leave it at once: Ctrl-C.
+    Interrupt,
     /// Save this; then [`Pages::say`] what came of it.
     Save(Box<Item>),
 }
@@ -75,7 +77,9 @@ impl Pages {
         pages.push(Page { part: "coadapt report".to_owned(), number: 0, leaf });
         for (number, section) in (1..).zip(&report.sections) {
             let Section { title, notes, items } = section;
-            let words = Leaf::Words { title: title.clone(), lines: notes.clone() };
+            // A blank line between one and the next.
+            let lines = notes.iter().flat_map(|note| [note.clone(), String::new()]).collect();
+            let words = Leaf::Words { title: title.clone(), lines };
             let leaves = items.iter().map(|item| Leaf::Item(Box::new(item.clone())));
             pages.extend(std::iter::once(words).chain(leaves).map(|leaf| Page {
                 part: title.clone(),
@@ -102,7 +106,8 @@ impl Pages {
             Action::Down => self.scrolled += 1,
             Action::Up => self.scrolled = self.scrolled.saturating_sub(1),
             Action::Help => self.help_open = true,
-            Action::Quit | Action::QuitNow => return Reaction::Quit,
+            Action::Quit => return Reaction::Quit,
+            Action::QuitNow => return Reaction::Interrupt,
             Action::Save => match self.all.get(self.at).map(|page| &page.leaf) {
                 Some(Leaf::Item(item)) => return Reaction::Save(item.clone()),
                 _ => self.say("nothing to save here: turn to a figure or a table"),
@@ -367,6 +372,8 @@ mod tests {
         press(&mut pages, KeyCode::Char('?'));
         assert_eq!(press(&mut pages, KeyCode::Char('q')), Reaction::Stay, "closes the help");
         assert_eq!(press(&mut pages, KeyCode::Char('q')), Reaction::Quit);
+        let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+        assert_eq!(pages.handle(ctrl_c), Reaction::Interrupt);
     }
 
     #[test]

@@ -51,16 +51,10 @@ static BLANK: AtomicBool = AtomicBool::new(false);
 #[derive(Debug, thiserror::Error)]
 pub enum NoScreen {
     /// Standard input or output is a file or a pipe.
-    #[error(
-        "there is no terminal here (standard {0} is not one): run coadapt in a terminal, or \
-         without a screen: coadapt run balance --headless --operator simulated:average"
-    )]
+    #[error("there is no terminal here (standard {0} is not one): run coadapt in a terminal")]
     NoTerminal(&'static str),
     /// The terminal cannot be drawn on.
-    #[error(
-        "the terminal says TERM=dumb and cannot show a screen: use another terminal, or run \
-         without a screen: coadapt run balance --headless --operator simulated:average"
-    )]
+    #[error("the terminal says TERM=dumb and cannot show a screen: use another terminal")]
     Dumb,
     /// The system refused.
     #[error("the terminal could not be taken over: {0}")]

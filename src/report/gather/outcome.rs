@@ -1,6 +1,7 @@
 //! A study's folder read back: the data of its figures, see `docs/STUDIES.md`.
 
 use std::fs::File;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -143,8 +144,7 @@ impl Document for Card {
 impl Outcome {
     /// Reads the study in `folder`; tables that cannot be read are left out and named.
     pub(super) fn read(folder: &Path) -> Result<Self, String> {
-        let card: Card =
-            read_document(&folder.join("study.json")).map_err(|error| error.to_string())?;
+        let card: Card = read_document(&folder.join("study.json")).map_err(|error| error.why())?;
         let mut outcome = Self {
             path: folder.to_owned(),
             name: card.name,
@@ -169,42 +169,73 @@ impl Outcome {
 
     /// The rows of the table at `path`; none where there is no such table.
     fn rows<T>(&mut self, path: &Path, row: Reading<T>) -> Vec<T> {
-        let Ok(file) = File::open(path) else { return Vec::new() };
+        let mut leave_out =
+            |why: String| self.left_out.push(LeftOut { path: path.display().to_string(), why });
+        let file = match File::open(path) {
+            Ok(file) => file,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Vec::new(),
+            Err(error) => {
+                leave_out(format!("cannot read it: {error}"));
+                return Vec::new();
+            }
+        };
         let mut table = csv::ReaderBuilder::new().flexible(true).from_reader(file);
-        let mut rows = Vec::new();
-        let mut faults: Option<(u64, String)> = None;
-        let mut bad = 0_usize;
         let head = table.headers().cloned().unwrap_or_default();
-        for record in table.records() {
-            let read = record.and_then(|record| {
-                let whole = record.len() == head.len();
-                let line = record.position().map_or(0, csv::Position::line);
-                Ok((line, if whole { Some(row(&record, &head)?) } else { None }))
-            });
-            match read {
-                Ok((_, Some(read))) => rows.push(read),
-                Ok((line, None)) => {
-                    bad += 1;
-                    faults.get_or_insert((line, "it is not whole".to_owned()));
+        if head.is_empty() {
+            leave_out("it is empty, or no table".to_owned());
+            return Vec::new();
+        }
+        let mut rows = Vec::new();
+        let mut first: Option<(u64, String)> = None;
+        let mut bad = 0_usize;
+        let mut records = table.into_records();
+        while let Some(record) = records.next() {
+            let line = records.reader().position().line().saturating_sub(1);
+            let (line, read) = match record {
+                // What the disk does not give now it will not give later.
+                Err(error) if error.is_io_error() => {
+                    leave_out(format!("it cannot be read beyond line {line}: {error}"));
+                    break;
                 }
-                Err(error) => {
-                    let line = error.position().map_or(0, csv::Position::line);
+                Err(error) => (line, Err(told(&error, &head))),
+                Ok(record) => {
+                    let line = record.position().map_or(line, csv::Position::line);
+                    let is_whole = record.len() == head.len();
+                    let read = if is_whole {
+                        row(&record, &head).map_err(|error| told(&error, &head))
+                    } else {
+                        Err("it is not whole".to_owned())
+                    };
+                    (line, read)
+                }
+            };
+            match read {
+                Ok(read) => rows.push(read),
+                Err(why) => {
                     bad += 1;
-                    faults.get_or_insert((line, error.to_string()));
-                    // What the disk does not give now it will not give later.
-                    if error.is_io_error() {
-                        break;
-                    }
+                    first.get_or_insert((line, why));
                 }
             }
         }
-        if let Some((line, why)) = faults {
-            let why = format!(
+        if let Some((line, why)) = first {
+            leave_out(format!(
                 "{bad} of its rows cannot be used, the first in line {line} ({why}): left out"
-            );
-            self.left_out.push(LeftOut { path: path.display().to_string(), why });
+            ));
         }
         rows
+    }
+}
+
+/// What is wrong with a row, in a reader's words.
+fn told(error: &csv::Error, head: &csv::StringRecord) -> String {
+    match error.kind() {
+        csv::ErrorKind::Io(error) => error.to_string(),
+        csv::ErrorKind::Utf8 { .. } => "it is not text (UTF-8)".to_owned(),
+        csv::ErrorKind::Deserialize { err, .. } => {
+            let place = err.field().and_then(|at| head.get(usize::try_from(at).ok()?));
+            format!("{}: {}", place.unwrap_or("a column"), err.kind())
+        }
+        _ => error.to_string(),
     }
 }
 
@@ -225,19 +256,19 @@ struct Row<'a> {
 
 impl Row<'_> {
     fn place(&self, name: &str) -> csv::Result<usize> {
-        let missing = || std::io::Error::other(format!("the table has no column {name}")).into();
+        let missing = || io::Error::other(format!("the table has no column {name}")).into();
         self.head.iter().position(|column| column == name).ok_or_else(missing)
     }
 
     fn text(&self, name: &str) -> csv::Result<String> {
         let place = self.place(name)?;
-        let cut = || std::io::Error::other(format!("{name} is cut off")).into();
+        let cut = || io::Error::other(format!("{name} is cut off")).into();
         self.record.get(place).map(str::to_owned).ok_or_else(cut)
     }
 
     fn number<T: FromStr>(&self, name: &str) -> csv::Result<T> {
         let text = self.text(name)?;
-        let none = |_| std::io::Error::other(format!("{name} is no number: {text:?}")).into();
+        let none = |_| io::Error::other(format!("{name} is no number: {text:?}")).into();
         text.parse().map_err(none)
     }
 

@@ -1,6 +1,6 @@
 //! A session read back for a report, whatever became of it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::{Field, Trace};
@@ -10,7 +10,8 @@ use crate::record::{
     EpisodeRow, Error, EvaluationRow, Policy, Sidecar, Status, read_policy, read_sidecar,
 };
 use crate::report::figure::LeftOut;
-use crate::report::words::plane;
+use crate::report::metrics::counts;
+use crate::report::words::{counted, plane};
 use crate::session::Phase;
 use crate::sharing::Mode;
 
@@ -45,8 +46,10 @@ pub struct Recorded {
     pub profile: BTreeMap<String, String>,
     /// Its rollouts, in order.
     pub rollouts: Vec<EpisodeRow>,
-    /// Rollouts that took place, but whose rows cannot be used or are gone.
+    /// Rollouts that took place, but whose rows cannot be used or are gone, as far as is known.
     pub lost: usize,
+    /// The rollouts that its `session.json` tells, by phase; none before its end.
+    told: BTreeMap<String, usize>,
     /// What the policy of each tenth of main did alone: percent and rollout.
     pub tenths: Vec<(u8, EpisodeRow)>,
     /// What its step rows tell.
@@ -95,6 +98,13 @@ impl Recorded {
             profile,
             rollouts: Vec::new(),
             lost: 0,
+            told: sidecar
+                .phases
+                .iter()
+                .filter_map(|(phase, told)| {
+                    Some((phase.clone(), usize::try_from(told.get("episodes")?.as_u64()?).ok()?))
+                })
+                .collect(),
             tenths: Vec::new(),
             trace: Trace::default(),
             features: Vec::new(),
@@ -107,19 +117,23 @@ impl Recorded {
         self.left_out.push(LeftOut { path: path.display().to_string(), why: why.into() });
     }
 
-    /// Names half a row at the end of `path`; whether there is one.
-    fn mind_the_end(&mut self, path: &Path) -> bool {
-        let is_cut = ends_in_half_a_row(path).unwrap_or(false);
-        if is_cut {
+    fn mind_the_end(&mut self, path: &Path) {
+        if ends_in_half_a_row(path).unwrap_or(false) {
             self.leave_out(path, "its last row is cut off: half a row is left out");
         }
-        is_cut
     }
 
     fn read_rollouts(&mut self) -> Result<(), Error> {
         let path = self.path.join("episodes.csv");
+        let mut seen = BTreeSet::new();
         for row in Episodes::open(&path)? {
             match row {
+                Ok(row) if counts(&row) && !seen.insert((row.phase, row.episode)) => {
+                    let (phase, episode) = (row.phase, row.episode);
+                    let why =
+                        format!("rollout {episode} of {phase} stands there twice: it counts once");
+                    self.leave_out(&path, why);
+                }
                 Ok(row) if is_finite(&row) => self.rollouts.push(row),
                 Ok(row) => {
                     let (phase, episode) = (row.phase, row.episode);
@@ -128,31 +142,47 @@ impl Recorded {
                          it is left out"
                     );
                     self.leave_out(&path, why);
-                    self.lost += 1;
                 }
                 Err(error @ Error::Io { .. }) => return Err(error),
                 Err(error) => {
                     self.leave_out(&path, format!("{}: the row is left out", error.why()));
-                    self.lost += 1;
                 }
             }
         }
-        self.lost += usize::from(self.mind_the_end(&path));
+        self.mind_the_end(&path);
+        self.count_lost(&path);
         Ok(())
+    }
+
+    /// Compares its rollouts with those that its `session.json` tells.
+    fn count_lost(&mut self, path: &Path) {
+        for phase in Phase::ALL {
+            let there = self.of_phase(phase).len();
+            let told = self.told.get(phase.word()).copied().unwrap_or(there);
+            if there < told {
+                self.lost += told - there;
+                let why = format!(
+                    "{} of {} of {phase} are missing, which session.json tells of: the session \
+                     counts in no group",
+                    told - there,
+                    counted(told, "rollout"),
+                );
+                self.leave_out(path, why);
+            }
+        }
     }
 
     fn read_trace(&mut self, points: usize) {
         let path = self.path.join("steps.csv");
         match Trace::read(&path, &self.rollouts, &plane(&self.task), points) {
             Ok((trace, spoilt)) => {
-                // Of a session that was killed the rollout under way has no row yet.
-                self.lost = self.lost.max(trace.unlisted);
-                let is_drawn = |row: &EpisodeRow| row.phase != Phase::Introduction;
-                if trace.portraits.is_empty()
-                    && spoilt.rows == 0
-                    && self.rollouts.iter().any(is_drawn)
-                {
-                    self.leave_out(&path, "it holds no rows: no figures of single ticks");
+                if trace.unseen > 0 {
+                    let why = format!(
+                        "the ticks of {} are missing at its end: figures of single ticks show the \
+                         others",
+                        counted(trace.unseen, "rollout")
+                    );
+                    self.leave_out(&path, why);
                 }
                 self.trace = trace;
                 if spoilt.rows > 0 {
@@ -183,23 +213,47 @@ impl Recorded {
         }
         match read_evaluation(&path) {
             Ok(rows) => {
-                let all = rows.len();
                 self.tenths = rows.iter().filter_map(tenth).collect();
-                if self.tenths.len() < all {
-                    let lost = all - self.tenths.len();
-                    self.leave_out(
-                        &path,
-                        format!(
-                            "{lost} of its rows hold no finite numbers, or name no tenth: left out"
-                        ),
+                let lost = rows.len() - self.tenths.len();
+                if lost > 0 {
+                    let why = format!(
+                        "{lost} of its rows hold no finite numbers, or name no tenth: left out"
                     );
+                    self.leave_out(&path, why);
                 }
                 self.mind_the_end(&path);
+                self.leave_out_short_tenths(&path);
             }
             Err(error) => {
                 self.leave_out(&path, format!("{}: no figures of each tenth", error.why()));
             }
         }
+    }
+
+    /// A tenth that was tried from fewer starts than others is no fair one.
+    fn leave_out_short_tenths(&mut self, path: &Path) {
+        let mut starts = BTreeMap::<u8, usize>::new();
+        for percent in (1..=10).map(|tenth| 10 * tenth) {
+            if self.path.join(format!("policy-{percent:03}.json")).exists() {
+                starts.insert(percent, 0);
+            }
+        }
+        for (percent, _) in &self.tenths {
+            *starts.entry(*percent).or_default() += 1;
+        }
+        let most = starts.values().copied().max().unwrap_or(0);
+        let short: Vec<u8> =
+            starts.iter().filter(|(_, count)| **count < most.max(1)).map(|(p, _)| *p).collect();
+        if short.is_empty() {
+            return;
+        }
+        self.tenths.retain(|(percent, _)| !short.contains(percent));
+        let names: Vec<String> = short.iter().map(|percent| format!("{percent} %")).collect();
+        let why = format!(
+            "the policies after {} of main have fewer rows than others, or none: left out",
+            names.join(", ")
+        );
+        self.leave_out(path, why);
     }
 
     fn read_policy(&mut self) {

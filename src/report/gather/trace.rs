@@ -27,8 +27,8 @@ pub struct Trace {
     pub closing: Vec<Acted>,
     /// Ticks of main.
     pub ticks: u64,
-    /// Rollouts of any phase that have ticks but no row in `episodes.csv`.
-    pub unlisted: usize,
+    /// Rollouts at the end of `episodes.csv` whose ticks are not there.
+    pub unseen: usize,
 }
 
 /// Where the plant went, in the plane of the task's phase portraits.
@@ -107,8 +107,6 @@ struct Walk<'a> {
     /// Time of main before this rollout, s.
     offset: f64,
     last_t: f64,
-    /// Rollouts without a row in `episodes.csv`.
-    unlisted: usize,
 }
 
 impl Walk<'_> {
@@ -126,13 +124,13 @@ impl Walk<'_> {
             }
             _ => (self.before, self.offset) = (0, 0.0),
         }
-        // Attempts stand in both files in the same order; one without rows is passed over.
-        let ahead = self.rows.iter().skip(self.row);
-        let found = ahead.clone().position(|row| (row.phase, row.episode) == (phase, episode));
+        // Attempts stand in both files in the same order; one that has no ticks is passed over.
+        let is_it =
+            |row: &EpisodeRow| (row.phase, row.episode) == (phase, episode) && row.steps > 0;
+        let found = self.rows.iter().skip(self.row).position(is_it);
         let row = found.and_then(|ahead| self.rows.get(self.row + ahead));
         self.is_discarded = row.is_some_and(|row| row.end == End::Discarded);
         self.row += found.map_or(0, |ahead| ahead + 1);
-        self.unlisted += usize::from(found.is_none());
         self.at = Some((phase, episode, step));
         self.last_t = 0.0;
     }
@@ -170,7 +168,6 @@ impl Trace {
             before: 0,
             offset: 0.0,
             last_t: 0.0,
-            unlisted: 0,
         };
         while let Some(row) = skim.next_row()? {
             let Some(phase) = row.phase() else { continue };
@@ -189,7 +186,7 @@ impl Trace {
             }
         }
         trace.closing = closing.into();
-        trace.unlisted = walk.unlisted;
+        trace.unseen = rows.iter().skip(walk.row).filter(|row| row.steps > 0).count();
         trace.regions.sort_by(|a, b| a.name.cmp(&b.name));
         Ok((trace, skim.spoilt()))
     }
@@ -300,9 +297,11 @@ mod tests {
         assert_eq!(times, [0.0, 0.02, 0.04, 0.06]);
         assert_eq!(trace.closing, trace.opening);
         assert_eq!(trace.regions[0].name, "all");
-        assert_eq!(trace.unlisted, 0);
-        let (short, _) = Trace::read(&path, &rows[..1], &plane("balance"), 100).unwrap();
-        assert_eq!(short.unlisted, 2);
+        assert_eq!(trace.unseen, 0);
+        let longer =
+            [&rows[..], &[rollout(3, 2, End::Failed), rollout(4, 0, End::Failed)]].concat();
+        let (short, _) = Trace::read(&path, &longer, &plane("balance"), 100).unwrap();
+        assert_eq!(short.unseen, 1);
     }
 
     #[test]

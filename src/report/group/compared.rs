@@ -1,14 +1,13 @@
 //! Both modes beside each other, with the tests that a reviewer asks for.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Group, Subject, average, last_average};
-use crate::report::achieved::yardstick;
+use crate::report::achieved::{Yardstick, yardstick};
 use crate::report::figure::{Caption, Contrast, Table};
 use crate::report::gather::Recorded;
 use crate::report::metrics::{deviation, mean};
 use crate::report::series::WINDOW;
-use crate::report::session::with_unit;
 use crate::report::spread::{LEAST_VALUES, median};
 use crate::report::statistics::{Comparison, Test, compare, compare_paired};
 use crate::report::words;
@@ -60,8 +59,13 @@ impl Pairing {
             seeds.dedup();
             seeds
         });
-        if names[0].iter().any(|name| names[1].contains(name)) {
+        let in_both = names[0].iter().filter(|name| names[1].contains(name)).count();
+        let in_one = names[0].len() + names[1].len() - 2 * in_both;
+        // Whichever way tells more of the people.
+        if in_both > 0 && in_both >= in_one {
             Self::Subjects
+        } else if in_both > 0 {
+            Self::None
         } else if is_simulated && seeds[0] == seeds[1] && seeds[0].len() == names[0].len() {
             Self::Seeds
         } else {
@@ -109,14 +113,27 @@ fn single_seed(subject: &Subject<'_>) -> Option<u64> {
     }
 }
 
-/// Those who were in one mode only.
-fn in_one_mode(arms: &[Vec<Subject<'_>>; 2]) -> Option<String> {
-    let is_in = |arm: &[Subject<'_>], name: &str| arm.iter().any(|one| one.name == name);
-    let names = arms.iter().flatten().map(|one| one.name);
-    let mut alone: Vec<&str> =
-        names.filter(|name| !arms.iter().all(|arm| is_in(arm, name))).collect();
-    alone.sort_unstable();
-    (!alone.is_empty()).then(|| alone.join(", "))
+/// Takes out of `arms` who does not fit the pairing, and names them: of pairs those who were in one
+/// mode only; else those who were in both, who are no independent people.
+fn leave_out_misfits(pairing: Pairing, arms: &mut [Vec<Subject<'_>>; 2]) -> Option<String> {
+    let names = arms.each_ref().map(|arm| arm.iter().map(|one| one.name).collect::<BTreeSet<_>>());
+    let is_in_both = |name: &str| names.iter().all(|names| names.contains(name));
+    let is_fit = |name: &str| match pairing {
+        Pairing::Subjects => is_in_both(name),
+        Pairing::None => !is_in_both(name),
+        Pairing::Seeds => true,
+    };
+    let all: BTreeSet<&str> = names.iter().flatten().copied().collect();
+    let misfits: Vec<&str> = all.into_iter().filter(|name| !is_fit(name)).collect();
+    for arm in arms.iter_mut() {
+        arm.retain(|one| is_fit(one.name));
+    }
+    let why = match pairing {
+        Pairing::Subjects => "in one mode only",
+        _ => "in both modes while most were in one",
+    };
+    (!misfits.is_empty())
+        .then(|| format!("Left out of the comparison, as they were {why}: {}.", misfits.join(", ")))
 }
 
 /// A bootstrap of few values is too narrow to be told.
@@ -127,13 +144,14 @@ fn without_narrow_interval(compared: Comparison) -> Comparison {
 
 /// Compares the modes of `group`.
 pub(super) fn table(group: &Group<'_>) -> Compared {
-    let arms = [group.arm(Mode::Simultaneous), group.arm(Mode::Sequential)];
+    let mut arms = [group.arm(Mode::Simultaneous), group.arm(Mode::Sequential)];
     if arms.iter().any(Vec::is_empty) {
         return Compared { table: None, sentences: Vec::new(), contrasts: Vec::new() };
     }
     let is_simulated =
         group.sessions.iter().all(|session| session.operator.starts_with("simulated"));
     let pairing = Pairing::of(&arms, is_simulated);
+    let misfits = leave_out_misfits(pairing, &mut arms);
     let yard = yardstick(group.task);
     let (mut rows, mut sentences, mut contrasts) = (Vec::new(), Vec::new(), Vec::new());
     for (name, of) in measures(group.task) {
@@ -169,11 +187,7 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
         let few = "Too few subjects for a test: it takes at least two in each mode.";
         sentences.push(few.to_owned());
     }
-    if pairing == Pairing::Subjects
-        && let Some(who) = in_one_mode(&arms)
-    {
-        sentences.push(format!("Left out, as they were in one mode only: {who}."));
-    }
+    sentences.extend(misfits);
     let (few, paired) = match pairing {
         Pairing::None => ("subjects are dealt to the modes", ""),
         Pairing::Subjects => ("differences of subjects change their sign", ", paired by subject"),
@@ -219,11 +233,13 @@ fn row(
     values: [&[f64]; 2],
     compared: Option<&Comparison>,
 ) -> Vec<String> {
-    let decimals = yardstick(task).decimals.max(2);
+    let Yardstick { unit, decimals, .. } = yardstick(task);
+    let decimals = decimals.max(2);
     let arm = |values: &[f64]| {
         let sd = deviation(values).map_or(String::new(), |sd| format!(" ± {sd:.decimals$}"));
         let middle = median(values).map_or(String::new(), |m| format!(", median {m:.decimals$}"));
-        format!("{}{sd}{middle} (n = {})", with_unit(task, mean(values)), values.len())
+        let blank = if unit.is_empty() { "" } else { " " };
+        format!("{:.decimals$}{blank}{unit}{sd}{middle} (n = {})", mean(values), values.len())
     };
     let nothing = "–".to_owned();
     let mut row = vec![name, arm(values[0]), arm(values[1])];

@@ -1,7 +1,8 @@
 //! The tables of a group: its subjects, the regions of swing-up (table 1), and what swing-up came
 //! to (table 2).
 
-use super::{Group, average, last_average, tenths};
+use super::tenths::tenths;
+use super::{Group, average, last_average};
 use crate::report::achieved::yardstick;
 use crate::report::figure::{Caption, Table};
 use crate::report::gather::Recorded;

@@ -45,7 +45,7 @@ impl Part<'_> {
             };
             let sentence = format!(
                 "The largest value of the agent's table in each cell of the state space, of the \
-                 best {arm} run (run {run}).{together}"
+                 best {arm} run (run {run} of the plan).{together}"
             );
             let (x, y) = self.plane();
             // The borders of the thesis's car; its table covers them.
@@ -100,7 +100,7 @@ impl Part<'_> {
         let (x, y) = self.plane();
         let sentence = format!(
             "The difference of normalised rewards from each of {} starts, averaged over the \
-             seeds: {}. Above 0 (orange) the first of the two is better; colours end at ± 1.",
+             seeds: {}. Above 0 the first of the two is better; the scale ends at ± 1.",
             xs.len() * ys.len(),
             pair(sides)
         );

@@ -51,7 +51,8 @@ pub fn read(
         record::Error::NoSession { .. } => FitError::Unfit(format!("{error}, or a table")),
         other => other.into(),
     })?;
-    let profile = Document::from_text("session.json", sidecar.profile_ron.clone()).read()?;
+    let profile =
+        Document::from_text("profile_ron of session.json", sidecar.profile_ron.clone()).read()?;
     let mut steps = reader::Steps::open(&folder.join("steps.csv"))?;
     let episodes =
         reader::Episodes::open(&folder.join("episodes.csv"))?.collect::<Result<Vec<_>, _>>()?;

@@ -16,8 +16,11 @@ use crate::tui::text::{cut, wrapped};
 const MOST_BARS: usize = 12;
 /// Points of a line from one sign of whose it is to the next.
 const SIGN_EVERY: usize = 20;
-/// What stands for the things of a kind.
+/// What stands for the things of a kind, and beyond them letters.
 const SIGNS: [char; 6] = ['o', '^', 'x', '+', '*', '#'];
+const LETTERS: &[u8; 24] = b"abcdefghijklmnpqrstuvwyz";
+/// What stands for a mean with its spread.
+const MEAN: char = '@';
 
 /// Draws `figure` with heading, legend and sentence.
 pub(super) fn draw(pen: &mut Pen<'_>, figure: &Figure) {
@@ -88,18 +91,25 @@ fn look_of(series: &Series, at: usize, glyphs: Glyphs) -> (Role, Marker, String)
         Mark::Thin => line("─", '.'),
         Mark::Dashed => line("╌╌", '-'),
         Mark::Dotted => line("┈┈", '\''),
+        Mark::Shape(_) if series.spread.is_some() => (role, Marker::Custom(MEAN), MEAN.to_string()),
         Mark::Shape(shape) | Mark::Linked(shape) | Mark::DashLinked(shape) => {
-            let sign =
-                SIGNS[(shape + usize::from(matches!(series.role, Meaning::One(_))) * at) % 6];
+            let is_one = matches!(series.role, Meaning::One(_));
+            let sign = sign(shape + if is_one { at } else { 0 });
             (role, Marker::Custom(sign), sign.to_string())
         }
     }
 }
 
+/// The sign of the `at`-th of many.
+fn sign(at: usize) -> char {
+    let letter = || char::from(LETTERS[(at - SIGNS.len()) % LETTERS.len()]);
+    SIGNS.get(at).copied().unwrap_or_else(letter)
+}
+
 /// The sign of one of many whose lines colours alone would tell apart.
 fn sign_of(series: &Series) -> Option<char> {
     match (series.role, series.mark) {
-        (Meaning::One(at), Mark::Line | Mark::Dashed | Mark::Dotted) => Some(SIGNS[at % 6]),
+        (Meaning::One(at), Mark::Line | Mark::Dashed | Mark::Dotted) => Some(sign(at)),
         _ => None,
     }
 }
@@ -136,7 +146,7 @@ type Curve = (Role, Marker, GraphType, Vec<(f64, f64)>);
 fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
     let all = || series.iter().flat_map(Series::pieces).flatten();
     let x = bounds(&figure.x, all().map(|point| point.0));
-    let spreads = series.iter().filter_map(|one| one.spread.as_ref()).flatten();
+    let spreads = series.iter().filter_map(spread_of).flatten();
     let ys = all().map(|point| point.1).chain(spreads.flat_map(|(a, b)| [*a, *b]));
     let (least, most) = bounds(&figure.y, ys);
     let y = (figure.ground().unwrap_or(least), most);
@@ -160,8 +170,10 @@ fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
             drawn.push((role, marker, kind, points));
         }
         if let Some(sign) = sign_of(one) {
-            let first = at * SIGN_EVERY / SIGNS.len();
-            let places = one.points.iter().skip(first).step_by(SIGN_EVERY).copied().collect();
+            let every = SIGN_EVERY.min(one.points.len()).max(1);
+            // One beside the other where lines run together.
+            let first = at % SIGNS.len() * every / SIGNS.len();
+            let places = one.points.iter().skip(first).step_by(every).copied().collect();
             signs.push((role, Marker::Custom(sign), GraphType::Scatter, places));
         }
         for ((x, _), (a, b)) in one.points.iter().zip(spread_of(one).into_iter().flatten()) {

@@ -36,6 +36,7 @@ pub fn show(screen: &mut Screen, bench: &mut dyn Bench, mut pages: Pages) -> End
             Heard::Event(Event::Key(key)) => match pages.handle(key) {
                 Reaction::Stay => {}
                 Reaction::Quit => return End::Quit,
+                Reaction::Interrupt => return End::Interrupted,
                 Reaction::Save(item) => {
                     let message = bench.save(&item);
                     pages.say(message);
