@@ -136,7 +136,9 @@ impl Skim {
                 whole if place < 3 => whole.iter().all(u8::is_ascii_digit),
                 [b'-', number @ ..] | number => {
                     number.first().is_some_and(u8::is_ascii_digit)
-                        && number.iter().all(|byte| b"0123456789.e-+".contains(byte))
+                        && number
+                            .iter()
+                            .all(|b| matches!(b, b'0'..=b'9' | b'.' | b'e' | b'-' | b'+'))
                 }
             })
     }
