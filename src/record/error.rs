@@ -108,7 +108,7 @@ impl Error {
         path
     }
 
-    pub(super) fn unfit(path: &Path, problem: impl Into<String>) -> Self {
+    pub(crate) fn unfit(path: &Path, problem: impl Into<String>) -> Self {
         Self::Unfit { path: path.to_owned(), problem: problem.into() }
     }
 }

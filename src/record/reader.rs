@@ -170,14 +170,30 @@ pub fn read_events(path: &Path) -> Result<Vec<EventRow<String>>, Error> {
 /// # Errors
 /// When it cannot be read, is another kind of table, or a cell is wrong.
 pub fn read_evaluation(path: &Path) -> Result<Vec<EvaluationRow>, Error> {
-    let mut lines = Lines::open(path, u64::MAX)?;
-    lines.demand(&EVALUATION_COLUMNS)?;
-    let counted = lines.header.len().saturating_sub(EVALUATION_COLUMNS.len());
-    let mut rows = Vec::new();
-    while let Some(read) = lines.advance() {
-        read?;
-        let mut cells = lines.cells();
-        rows.push(EvaluationRow {
+    Evaluations::open(path)?.collect()
+}
+
+/// The rows of `evaluation.csv`, one at a time.
+pub struct Evaluations {
+    lines: Lines,
+    counted: usize,
+}
+
+impl Evaluations {
+    /// Opens an `evaluation.csv`.
+    ///
+    /// # Errors
+    /// When it cannot be read, or is another kind of table.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let lines = Lines::open(path, u64::MAX)?;
+        lines.demand(&EVALUATION_COLUMNS)?;
+        let counted = lines.header.len().saturating_sub(EVALUATION_COLUMNS.len());
+        Ok(Self { lines, counted })
+    }
+
+    fn row(&self) -> Result<EvaluationRow, Error> {
+        let mut cells = self.lines.cells();
+        Ok(EvaluationRow {
             policy: cells.value()?,
             episode: cells.value()?,
             start: cells.value()?,
@@ -186,10 +202,17 @@ pub fn read_evaluation(path: &Path) -> Result<Vec<EvaluationRow>, Error> {
             end: cells.word()?,
             total: cells.value()?,
             mean_reward: cells.value()?,
-            tallied: cells.tallied(counted)?,
-        });
+            tallied: cells.tallied(self.counted)?,
+        })
     }
-    Ok(rows)
+}
+
+impl Iterator for Evaluations {
+    type Item = Result<EvaluationRow, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.lines.advance().map(|read| read.and_then(|()| self.row()))
+    }
 }
 
 /// Whether the table at `path` ends in the middle of a row.

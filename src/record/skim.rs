@@ -32,6 +32,22 @@ pub struct Spoilt {
     pub first_line: u64,
 }
 
+impl Spoilt {
+    /// That in words, where there are some.
+    #[must_use]
+    pub fn told(self) -> Option<String> {
+        let (rows, verb) = match self.rows {
+            0 => return None,
+            1 => ("a row".to_owned(), "is"),
+            rows => (format!("{rows} rows"), "are"),
+        };
+        let line = self.first_line;
+        Some(format!(
+            "{rows} {verb} cut off or not of finite numbers, from line {line} on: left out"
+        ))
+    }
+}
+
 /// A number of a row, beside its state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Number {
@@ -134,14 +150,24 @@ impl Skim {
                 [] => place >= before + self.state,
                 // The rollout and the step.
                 whole if place < 3 => whole.iter().all(u8::is_ascii_digit),
-                [b'-', number @ ..] | number => {
-                    number.first().is_some_and(u8::is_ascii_digit)
-                        && number
-                            .iter()
-                            .all(|b| matches!(b, b'0'..=b'9' | b'.' | b'e' | b'-' | b'+'))
-                }
+                number => is_finite(number),
             })
     }
+}
+
+/// Whether `cell` is a finite number. Most are digits with a point, which are quickly told.
+fn is_finite(cell: &[u8]) -> bool {
+    let digits = cell.strip_prefix(b"-").unwrap_or(cell);
+    let mut points = 0;
+    let is_plain = digits.len() < 300
+        && digits.first().is_some_and(u8::is_ascii_digit)
+        && digits.iter().all(|byte| {
+            points += usize::from(*byte == b'.');
+            byte.is_ascii_digit() || *byte == b'.'
+        })
+        && points < 2;
+    let number = || std::str::from_utf8(cell).ok()?.parse::<f64>().ok();
+    is_plain || number().is_some_and(f64::is_finite)
 }
 
 fn misread(path: &Path, fault: csv::Error) -> Error {
@@ -252,7 +278,9 @@ mod tests {
             "main,1,3,0.06,1.0,-inf,,,,,,,,,0,\n",
             "main,1,4,0.08,,2.0,,,,,,,,,0,\n",
             "main,1x,4,0.08,1.0,2.0,,,,,,,,,0,\n",
-            "main,1,4,0.0.8?,1.0,2.0,,,,,,,,,0,\n",
+            "main,1,4,0.0.8,1.0,2.0,,,,,,,,,0,\n",
+            "main,1,4,9e999,1.0,2.0,,,,,,,,,0,\n",
+            "main,1,4,1-2,1.0,2.0,,,,,,,,,0,\n",
             "\"main,1,4,0.08,1.0,2.0,,,,,,,,,0,\n",
         ];
         let (_folder, skim) = skim(&format!("{HEAD}{good}{}{good}main,1,5,0.1,1.", rows.concat()));
@@ -261,7 +289,7 @@ mod tests {
         while skim.next_row().unwrap().is_some() {
             good_rows += 1;
         }
-        assert_eq!((good_rows, skim.spoilt()), (2, Spoilt { rows: 8, first_line: 3 }));
+        assert_eq!((good_rows, skim.spoilt()), (2, Spoilt { rows: 10, first_line: 3 }));
     }
 
     #[test]

@@ -110,10 +110,11 @@ fn look(folder: &Path, depth: u32, seen: &mut BTreeSet<PathBuf>, found: &mut Fou
     true
 }
 
-/// Whether something was recorded in `folder`, which stays as it is.
+/// Whether something was recorded in `folder`, which stays as it is, or it is a part of a study.
 #[must_use]
 pub fn holds_records(folder: &Path) -> bool {
-    !matches!(kind(folder), Ok(Kind::Shelf(_)) | Err(_))
+    let is_of_a_study = || matches!(folder.parent().map(kind), Some(Ok(Kind::Study)));
+    !matches!(kind(folder), Ok(Kind::Shelf(_)) | Err(_)) || is_of_a_study()
 }
 
 fn kind(folder: &Path) -> io::Result<Kind> {
@@ -134,7 +135,9 @@ fn kind(folder: &Path) -> io::Result<Kind> {
     Ok(match () {
         () if has("session.json")? => Kind::Session,
         () if has("study.json")? => Kind::Study,
-        () if has("steps.csv")? || has("episodes.csv")? => Kind::Headless("session.json"),
+        () if has("steps.csv")? || has("episodes.csv")? || has("evaluation.csv")? => {
+            Kind::Headless("session.json")
+        }
         () if has("results.csv")? && folder.join("runs").is_dir() => Kind::Headless("study.json"),
         () => Kind::Shelf(below),
     })

@@ -107,7 +107,7 @@ fn write_item(item: &Item, folder: &Path) -> Result<(), RunError> {
 /// Writes a file that is there whole or not at all; where something that is no file is there, as
 /// a pipe, to that. What was recorded is not written over.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
-    // A link stays one.
+    // A link that leads somewhere stays one.
     let path = &fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Field, Trace};
 use crate::learner::Model;
-use crate::record::reader::{Episodes, ends_in_half_a_row, read_evaluation};
+use crate::record::reader::{Episodes, Evaluations, ends_in_half_a_row};
 use crate::record::{
     EpisodeRow, Error, EvaluationRow, Policy, Sidecar, Status, read_policy, read_sidecar,
 };
@@ -128,14 +128,7 @@ impl Recorded {
         let mut seen = BTreeSet::new();
         for row in Episodes::open(&path)? {
             match row {
-                Ok(row) if counts(&row) && !seen.insert((row.phase, row.episode)) => {
-                    let (phase, episode) = (row.phase, row.episode);
-                    let why =
-                        format!("rollout {episode} of {phase} stands there twice: it counts once");
-                    self.leave_out(&path, why);
-                }
-                Ok(row) if is_finite(&row) => self.rollouts.push(row),
-                Ok(row) => {
+                Ok(row) if !is_finite(&row) => {
                     let (phase, episode) = (row.phase, row.episode);
                     let why = format!(
                         "the row of rollout {episode} of {phase} holds NaN or an infinite number: \
@@ -143,6 +136,13 @@ impl Recorded {
                     );
                     self.leave_out(&path, why);
                 }
+                Ok(row) if counts(&row) && !seen.insert((row.phase, row.episode)) => {
+                    let (phase, episode) = (row.phase, row.episode);
+                    let why =
+                        format!("rollout {episode} of {phase} stands there twice: it counts once");
+                    self.leave_out(&path, why);
+                }
+                Ok(row) => self.rollouts.push(row),
                 Err(error @ Error::Io { .. }) => return Err(error),
                 Err(error) => {
                     self.leave_out(&path, format!("{}: the row is left out", error.why()));
@@ -154,21 +154,33 @@ impl Recorded {
         Ok(())
     }
 
-    /// Compares its rollouts with those that its `session.json` tells.
+    /// Compares its rollouts with those that its `session.json` tells; before a session's end that
+    /// tells none, but their numbers do.
     fn count_lost(&mut self, path: &Path) {
+        let mut lost = Vec::new();
         for phase in Phase::ALL {
             let there = self.of_phase(phase).len();
-            let told = self.told.get(phase.word()).copied().unwrap_or(there);
-            if there < told {
-                self.lost += told - there;
-                let why = format!(
-                    "{} of {} of {phase} are missing, which session.json tells of: the session \
-                     counts in no group",
-                    told - there,
-                    counted(told, "rollout"),
-                );
-                self.leave_out(path, why);
+            let numbers: BTreeSet<u32> = self
+                .rollouts
+                .iter()
+                .filter(|row| row.phase == phase)
+                .map(|row| row.episode)
+                .collect();
+            let last = numbers.last().map_or(0, |last| *last as usize);
+            let told = self.told.get(phase.word()).copied();
+            let missing =
+                told.map_or(last - numbers.len().min(last), |told| told.saturating_sub(there));
+            if missing > 0 {
+                self.lost += missing;
+                lost.push(format!("{missing} of {} of {phase}", told.unwrap_or(last)));
             }
+        }
+        if !lost.is_empty() {
+            let why = format!(
+                "rollouts that took place are missing: {}; the session counts in no group",
+                lost.join(", ")
+            );
+            self.leave_out(path, why);
         }
     }
 
@@ -176,28 +188,18 @@ impl Recorded {
         let path = self.path.join("steps.csv");
         match Trace::read(&path, &self.rollouts, &plane(&self.task), points) {
             Ok((trace, spoilt)) => {
-                if trace.unseen > 0 {
-                    let why = format!(
-                        "the ticks of {} are missing at its end: figures of single ticks show the \
-                         others",
-                        counted(trace.unseen, "rollout")
-                    );
+                let told = [
+                    spoilt.told(),
+                    trace.missing_beside(spoilt.rows),
+                    (trace.doubled > 0).then(|| {
+                        let rows = counted(trace.doubled, "row");
+                        format!("{rows} of steps that were there already: left out")
+                    }),
+                ];
+                for why in told.into_iter().flatten() {
                     self.leave_out(&path, why);
                 }
                 self.trace = trace;
-                if spoilt.rows > 0 {
-                    let why = format!(
-                        "{} cut off or with NaN or another thing that is no number, the first in \
-                         line {}: left out",
-                        if spoilt.rows == 1 {
-                            "a row is".to_owned()
-                        } else {
-                            format!("{} rows are", spoilt.rows)
-                        },
-                        spoilt.first_line
-                    );
-                    self.leave_out(&path, why);
-                }
                 self.mind_the_end(&path);
             }
             Err(error) => {
@@ -211,23 +213,37 @@ impl Recorded {
         if !path.exists() {
             return;
         }
-        match read_evaluation(&path) {
-            Ok(rows) => {
-                self.tenths = rows.iter().filter_map(tenth).collect();
-                let lost = rows.len() - self.tenths.len();
-                if lost > 0 {
-                    let why = format!(
-                        "{lost} of its rows hold no finite numbers, or name no tenth: left out"
-                    );
-                    self.leave_out(&path, why);
-                }
-                self.mind_the_end(&path);
-                self.leave_out_short_tenths(&path);
-            }
+        let rows = match Evaluations::open(&path) {
+            Ok(rows) => rows,
             Err(error) => {
                 self.leave_out(&path, format!("{}: no figures of each tenth", error.why()));
+                return;
+            }
+        };
+        let mut seen = BTreeSet::new();
+        let mut bad = None;
+        for row in rows {
+            let row = row.and_then(|row| {
+                let why = "a number is not finite, or the policy is none of a tenth";
+                tenth(&row).ok_or_else(|| Error::unfit(&path, why))
+            });
+            match row {
+                Ok((percent, row)) if seen.insert((percent, row.episode)) => {
+                    self.tenths.push((percent, row));
+                }
+                Ok(_) => {}
+                Err(error) => {
+                    let (count, _) = bad.get_or_insert((0, error));
+                    *count += 1;
+                }
             }
         }
+        if let Some((count, first)) = bad {
+            let rows = counted(count, "row");
+            self.leave_out(&path, format!("{rows} left out, the first because: {}", first.why()));
+        }
+        self.mind_the_end(&path);
+        self.leave_out_short_tenths(&path);
     }
 
     /// A tenth that was tried from fewer starts than others is no fair one.
@@ -245,6 +261,10 @@ impl Recorded {
         let short: Vec<u8> =
             starts.iter().filter(|(_, count)| **count < most.max(1)).map(|(p, _)| *p).collect();
         if short.is_empty() {
+            return;
+        }
+        if most == 0 {
+            self.leave_out(path, "it holds no row that can be used: no figures of each tenth");
             return;
         }
         self.tenths.retain(|(percent, _)| !short.contains(percent));

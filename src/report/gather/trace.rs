@@ -27,8 +27,12 @@ pub struct Trace {
     pub closing: Vec<Acted>,
     /// Ticks of main.
     pub ticks: u64,
-    /// Rollouts at the end of `episodes.csv` whose ticks are not there.
-    pub unseen: usize,
+    /// Steps of the rollouts in `episodes.csv`,
+    pub steps: u64,
+    /// and how many of these have a row.
+    pub found: u64,
+    /// Rows of a step that was there already.
+    pub doubled: usize,
 }
 
 /// Where the plant went, in the plane of the task's phase portraits.
@@ -100,6 +104,8 @@ struct Walk<'a> {
     rows: &'a [EpisodeRow],
     /// The row of `episodes.csv` that the attempt under way ends with.
     row: usize,
+    /// That row, where there is one.
+    here: Option<&'a EpisodeRow>,
     at: Option<(Phase, u32, u32)>,
     is_discarded: bool,
     /// Rollouts of the phase before this one.
@@ -110,29 +116,35 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// Takes in that a row of `phase` and `episode` comes.
-    fn go_to(&mut self, phase: Phase, episode: u32, step: u32) {
-        let is_same = |(p, e, s): (Phase, u32, u32)| p == phase && e == episode && step > s;
-        if self.at.is_some_and(is_same) {
+    /// Takes in that a row of `phase`, `episode` and `step` comes; false where it did already.
+    fn go_to(&mut self, phase: Phase, episode: u32, step: u32) -> bool {
+        let before = self.at.filter(|(p, e, _)| (*p, *e) == (phase, episode));
+        if before.is_some_and(|(.., last)| step > last) {
             self.at = Some((phase, episode, step));
-            return;
-        }
-        match self.at {
-            Some((old, ..)) if old == phase => {
-                self.before += usize::from(!self.is_discarded);
-                self.offset += if self.is_discarded { 0.0 } else { self.last_t };
-            }
-            _ => (self.before, self.offset) = (0, 0.0),
+            return true;
         }
         // Attempts stand in both files in the same order; one that has no ticks is passed over.
         let is_it =
             |row: &EpisodeRow| (row.phase, row.episode) == (phase, episode) && row.steps > 0;
         let found = self.rows.iter().skip(self.row).position(is_it);
-        let row = found.and_then(|ahead| self.rows.get(self.row + ahead));
-        self.is_discarded = row.is_some_and(|row| row.end == End::Discarded);
+        let is_past = |row: &EpisodeRow| (row.phase, row.episode) == (phase, episode);
+        if found.is_none() && self.rows.iter().take(self.row).rev().any(is_past) {
+            return false;
+        }
+        match self.at {
+            Some((old, ..)) if old == phase => {
+                self.before += usize::from(!self.is_discarded);
+                let duration = self.here.map_or(self.last_t, |row| row.duration_s);
+                self.offset += if self.is_discarded { 0.0 } else { duration };
+            }
+            _ => (self.before, self.offset) = (0, 0.0),
+        }
+        self.here = found.and_then(|ahead| self.rows.get(self.row + ahead));
+        self.is_discarded = self.here.is_some_and(|row| row.end == End::Discarded);
         self.row += found.map_or(0, |ahead| ahead + 1);
         self.at = Some((phase, episode, step));
         self.last_t = 0.0;
+        true
     }
 }
 
@@ -163,6 +175,7 @@ impl Trace {
         let mut walk = Walk {
             rows,
             row: 0,
+            here: None,
             at: None,
             is_discarded: false,
             before: 0,
@@ -172,7 +185,11 @@ impl Trace {
         while let Some(row) = skim.next_row()? {
             let Some(phase) = row.phase() else { continue };
             let (episode, step) = (row.episode(), row.step());
-            walk.go_to(phase, episode, step);
+            if !walk.go_to(phase, episode, step) {
+                trace.doubled += 1;
+                continue;
+            }
+            trace.found += u64::from(walk.here.is_some_and(|row| step < row.steps));
             if walk.is_discarded {
                 continue;
             }
@@ -186,9 +203,23 @@ impl Trace {
             }
         }
         trace.closing = closing.into();
-        trace.unseen = rows.iter().skip(walk.row).filter(|row| row.steps > 0).count();
+        trace.steps = rows.iter().map(|row| u64::from(row.steps)).sum();
         trace.regions.sort_by(|a, b| a.name.cmp(&b.name));
         Ok((trace, skim.spoilt()))
+    }
+
+    /// That steps of its rollouts have no row, in words, where there are more than the `spoilt` ones.
+    pub(super) fn missing_beside(&self, spoilt: u64) -> Option<String> {
+        let missing = self.steps - self.found.min(self.steps);
+        match self.found {
+            _ if missing <= spoilt => None,
+            0 => Some("no step of its rollouts is there: no figures of single ticks".to_owned()),
+            _ => Some(format!(
+                "{missing} of the {} steps of its rollouts are not there: figures of single ticks \
+                 show the others",
+                self.steps
+            )),
+        }
     }
 
     /// Takes in a tick of main at time `t`.
@@ -297,11 +328,40 @@ mod tests {
         assert_eq!(times, [0.0, 0.02, 0.04, 0.06]);
         assert_eq!(trace.closing, trace.opening);
         assert_eq!(trace.regions[0].name, "all");
-        assert_eq!(trace.unseen, 0);
-        let longer =
-            [&rows[..], &[rollout(3, 2, End::Failed), rollout(4, 0, End::Failed)]].concat();
-        let (short, _) = Trace::read(&path, &longer, &plane("balance"), 100).unwrap();
-        assert_eq!(short.unseen, 1);
+        assert_eq!((trace.steps, trace.found, trace.doubled), (6, 6, 0));
+        assert_eq!(trace.missing_beside(0), None);
+    }
+
+    #[test]
+    fn steps_that_are_missing_or_doubled_are_known_and_move_nothing() {
+        let rows = [(1, End::Failed), (2, End::Failed), (3, End::Failed)]
+            .map(|(n, end)| rollout(n, 2, end));
+        let head = "phase,episode,step,t,x,x_dot,theta,theta_dot,u_human,u_machine,share,u,\
+                    u_applied,reward,success,region,lateness_us\n";
+        let row = |n: u32, step: u32| {
+            format!(
+                "main,{n},{step},{},0.0,0.0,0.1,0.0,1.0,2.0,0.5,1.5,1.5,0.0,,all,0\n",
+                0.02 * f64::from(step)
+            )
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("steps.csv");
+        let read = |ticks: &[(u32, u32)]| {
+            let ticks: String = ticks.iter().map(|(n, step)| row(*n, *step)).collect();
+            std::fs::write(&path, format!("{head}{ticks}")).unwrap();
+            Trace::read(&path, &rows, &plane("balance"), 100).unwrap().0
+        };
+        let last = |trace: &Trace| trace.closing.last().unwrap().t;
+        let whole = read(&[(1, 0), (1, 1), (2, 0), (2, 1), (3, 0), (3, 1)]);
+        assert_eq!((whole.found, whole.doubled, last(&whole)), (6, 0, 0.1));
+        // A row, and a block over a rollout's end, twice.
+        let doubled =
+            read(&[(1, 0), (1, 1), (1, 1), (2, 0), (1, 1), (2, 0), (2, 1), (3, 0), (3, 1)]);
+        assert_eq!((doubled.found, doubled.doubled, last(&doubled)), (6, 3, 0.1));
+        let cut = read(&[(1, 0), (2, 1), (3, 0), (3, 1)]);
+        assert_eq!((cut.found, last(&cut)), (4, 0.1));
+        assert!(cut.missing_beside(1).unwrap().starts_with("2 of the 6 steps"));
+        assert!(read(&[]).missing_beside(0).unwrap().starts_with("no step"));
     }
 
     #[test]

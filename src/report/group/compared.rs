@@ -44,6 +44,8 @@ fn measures(task: &str) -> [Measure; 3] {
 enum Pairing {
     /// They do not.
     None,
+    /// Too few are in both modes to be paired, and too few in one only to be compared.
+    Unclear,
     /// They are the same people, or some are: whoever was in one mode only is left out.
     Subjects,
     /// They are simulated, with the same seeds.
@@ -60,12 +62,15 @@ impl Pairing {
             seeds
         });
         let in_both = names[0].iter().filter(|name| names[1].contains(name)).count();
-        let in_one = names[0].len() + names[1].len() - 2 * in_both;
-        // Whichever way tells more of the people.
-        if in_both > 0 && in_both >= in_one {
+        let in_one = [names[0].len() - in_both, names[1].len() - in_both];
+        // A test takes two people in each mode. Of both ways, the one that tells of more people.
+        let (is_paired, is_apart) = (in_both >= 2, in_one.iter().all(|count| *count >= 2));
+        if is_paired && (in_both >= in_one[0] + in_one[1] || !is_apart) {
             Self::Subjects
-        } else if in_both > 0 {
+        } else if in_both > 0 && is_apart {
             Self::None
+        } else if in_both > 0 {
+            Self::Unclear
         } else if is_simulated && seeds[0] == seeds[1] && seeds[0].len() == names[0].len() {
             Self::Seeds
         } else {
@@ -76,7 +81,7 @@ impl Pairing {
     /// By what they are paired.
     const fn word(self) -> Option<&'static str> {
         match self {
-            Self::None => None,
+            Self::None | Self::Unclear => None,
             Self::Subjects => Some("subject"),
             Self::Seeds => Some("seed"),
         }
@@ -88,7 +93,7 @@ impl Pairing {
         arms: &[Vec<Subject<'_>>; 2],
         of: impl Fn(&Subject<'_>) -> Option<f64>,
     ) -> [Vec<f64>; 2] {
-        if self == Self::None {
+        if matches!(self, Self::None | Self::Unclear) {
             return arms.each_ref().map(|arm| arm.iter().filter_map(&of).collect());
         }
         let key = |subject: &Subject<'_>| match self {
@@ -121,7 +126,7 @@ fn leave_out_misfits(pairing: Pairing, arms: &mut [Vec<Subject<'_>>; 2]) -> Opti
     let is_fit = |name: &str| match pairing {
         Pairing::Subjects => is_in_both(name),
         Pairing::None => !is_in_both(name),
-        Pairing::Seeds => true,
+        Pairing::Seeds | Pairing::Unclear => true,
     };
     let all: BTreeSet<&str> = names.iter().flatten().copied().collect();
     let misfits: Vec<&str> = all.into_iter().filter(|name| !is_fit(name)).collect();
@@ -130,7 +135,7 @@ fn leave_out_misfits(pairing: Pairing, arms: &mut [Vec<Subject<'_>>; 2]) -> Opti
     }
     let why = match pairing {
         Pairing::Subjects => "in one mode only",
-        _ => "in both modes while most were in one",
+        _ => "in both modes, the others in one",
     };
     (!misfits.is_empty())
         .then(|| format!("Left out of the comparison, as they were {why}: {}.", misfits.join(", ")))
@@ -157,6 +162,7 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
     for (name, of) in measures(group.task) {
         let [a, b] = pairing.values(&arms, |subject| subject.mean_of(of));
         let compared = match pairing {
+            Pairing::Unclear => None,
             Pairing::None => compare(&a, &b, SEED),
             _ => compare_paired(&a, &b, SEED),
         };
@@ -184,12 +190,13 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
         }
     }
     if sentences.is_empty() {
-        let few = "Too few subjects for a test: it takes at least two in each mode.";
+        let few =
+            "Too few subjects for a test: it takes at least two in each mode, or two in both.";
         sentences.push(few.to_owned());
     }
     sentences.extend(misfits);
     let (few, paired) = match pairing {
-        Pairing::None => ("subjects are dealt to the modes", ""),
+        Pairing::None | Pairing::Unclear => ("subjects are dealt to the modes", ""),
         Pairing::Subjects => ("differences of subjects change their sign", ", paired by subject"),
         Pairing::Seeds => ("differences of seeds change their sign", ", paired by seed"),
     };
@@ -236,6 +243,9 @@ fn row(
     let Yardstick { unit, decimals, .. } = yardstick(task);
     let decimals = decimals.max(2);
     let arm = |values: &[f64]| {
+        if values.is_empty() {
+            return "–".to_owned();
+        }
         let sd = deviation(values).map_or(String::new(), |sd| format!(" ± {sd:.decimals$}"));
         let middle = median(values).map_or(String::new(), |m| format!(", median {m:.decimals$}"));
         let blank = if unit.is_empty() { "" } else { " " };

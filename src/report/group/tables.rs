@@ -39,7 +39,7 @@ pub(super) fn subjects(group: &Group<'_>) -> Option<Table> {
                 subject.mean_of(|session| of(session.of_phase(Phase::Main).last()?))
             };
             let last = subject.mean_of(last_average);
-            let first_tenth = subject.mean_of(|session| tenths(session).into_values().next());
+            let first_tenth = subject.mean_of(|session| tenths(session).get(&10).copied());
             let alone = |phase| subject.mean_of(|session| average(session, phase));
             let percent = |value: Option<f64>| number(value.map(|value| 100.0 * value), 0);
             rows.push(vec![

@@ -38,9 +38,10 @@ impl<'a> Group<'a> {
                 let at = |percent: u8| {
                     let values: Vec<f64> =
                         each.iter().filter_map(|one| one.get(&percent)).copied().collect();
-                    (percent, mean(&values))
+                    // Of sessions that all have it: others would be other means.
+                    (values.len() == each.len()).then(|| (percent, mean(&values)))
                 };
-                (subject.name, percents.into_iter().map(at).collect::<BTreeMap<_, _>>())
+                (subject.name, percents.into_iter().filter_map(at).collect::<BTreeMap<_, _>>())
             });
             (mode, known.filter(|(_, tenths)| !tenths.is_empty()).collect::<Vec<_>>())
         });
@@ -86,7 +87,10 @@ impl<'a> Group<'a> {
         let all = self.after_tenths();
         let percents: BTreeSet<u8> =
             all.iter().flat_map(|(_, arm)| arm).flat_map(|(_, t)| t.keys()).copied().collect();
-        let mut lacking = Vec::new();
+        if percents.first() != Some(&10) {
+            return None;
+        }
+        let mut lacking = BTreeSet::new();
         for (mode, mut subjects) in all {
             // A mean of others at the end than at the beginning would be no improvement.
             subjects.retain(|(name, tenths)| {
@@ -121,10 +125,11 @@ impl<'a> Group<'a> {
             "How much better the mean of each group's robots alone is than after the first tenth \
              of main; at the end {}.{}",
             told.join(", "),
-            match &lacking[..] {
-                [] => String::new(),
-                names =>
-                    format!(" Without {}: a number of some tenth is missing.", names.join(", ")),
+            if lacking.is_empty() {
+                String::new()
+            } else {
+                let names: Vec<&str> = lacking.into_iter().collect();
+                format!(" Without {}: a number of some tenth is missing.", names.join(", "))
             }
         );
         let title = "Improvement of the robot alone over the first tenth";

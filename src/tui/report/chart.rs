@@ -19,6 +19,8 @@ const SIGN_EVERY: usize = 20;
 /// What stands for the things of a kind, and beyond them letters.
 const SIGNS: [char; 6] = ['o', '^', 'x', '+', '*', '#'];
 const LETTERS: &[u8; 24] = b"abcdefghijklmnpqrstuvwyz";
+/// Lines of a legend.
+const MOST_LINES: usize = 4;
 /// What stands for a mean with its spread.
 const MEAN: char = '@';
 
@@ -71,8 +73,52 @@ fn spread_of(series: &Series) -> Option<&Vec<(f64, f64)>> {
     series.spread.as_ref().filter(is_drawn).filter(|spread| spread.len() <= MOST_BARS)
 }
 
-/// What stands for a series: its colour, what it is drawn with, and that as the legend has it.
-fn look_of(series: &Series, at: usize, glyphs: Glyphs) -> (Role, Marker, String) {
+/// What stands for a series.
+struct Sight {
+    role: Role,
+    /// What it is drawn with.
+    marker: Marker,
+    /// Its own sign, where it has one: no two series share it.
+    sign: Option<char>,
+    /// All that as the legend has it.
+    legend: String,
+}
+
+/// What stands for each of `series`.
+fn sights(series: &[Series], glyphs: Glyphs) -> Vec<Sight> {
+    let mut taken = Vec::new();
+    series
+        .iter()
+        .map(|one| {
+            let sign = wanted_sign(one).map(|first| {
+                let free = (first..first + SIGNS.len() + LETTERS.len()).map(sign);
+                free.clone().find(|sign| !taken.contains(sign)).unwrap_or_else(|| sign(first))
+            });
+            let is_mean = matches!(one.mark, Mark::Shape(_)) && one.spread.is_some();
+            let sign = if is_mean { Some(MEAN) } else { sign };
+            taken.extend(sign);
+            sight(one, sign, glyphs)
+        })
+        .collect()
+}
+
+/// The number of the sign that a series would have: of one of many, whose lines colours alone
+/// would tell apart, and of shapes.
+fn wanted_sign(series: &Series) -> Option<usize> {
+    match (series.mark, series.role) {
+        (Mark::Shape(shape) | Mark::Linked(shape) | Mark::DashLinked(shape), _) => Some(shape),
+        (Mark::Line | Mark::Dashed | Mark::Dotted, Meaning::One(at)) => Some(at),
+        _ => None,
+    }
+}
+
+/// The `at`-th sign.
+fn sign(at: usize) -> char {
+    let letter = || char::from(LETTERS[(at - SIGNS.len()) % LETTERS.len()]);
+    SIGNS.get(at).copied().unwrap_or_else(letter)
+}
+
+fn sight(series: &Series, sign: Option<char>, glyphs: Glyphs) -> Sight {
     let role = match series.role {
         Meaning::Simultaneous | Meaning::Machine => Role::Robot,
         Meaning::Sequential | Meaning::Human => Role::You,
@@ -81,50 +127,32 @@ fn look_of(series: &Series, at: usize, glyphs: Glyphs) -> (Role, Marker, String)
             [Role::You, Role::Robot, Role::Go, Role::Countdown, Role::Wait, Role::Text][at % 6]
         }
     };
-    let whose = sign_of(series);
-    let line = |fine: &str, coarse: char| match glyphs {
-        Glyphs::Braille => (role, Marker::Braille, format!("{fine}{}", text_of(whose))),
-        _ => (role, Marker::Custom(coarse), format!("{coarse}{}", text_of(whose))),
-    };
-    match series.mark {
-        Mark::Line => line("──", '.'),
-        Mark::Thin => line("─", '.'),
-        Mark::Dashed => line("╌╌", '-'),
-        Mark::Dotted => line("┈┈", '\''),
-        Mark::Shape(_) if series.spread.is_some() => (role, Marker::Custom(MEAN), MEAN.to_string()),
-        Mark::Shape(shape) | Mark::Linked(shape) | Mark::DashLinked(shape) => {
-            let is_one = matches!(series.role, Meaning::One(_));
-            let sign = sign(shape + if is_one { at } else { 0 });
-            (role, Marker::Custom(sign), sign.to_string())
+    let (fine, coarse) = match series.mark {
+        Mark::Line => ("──", '.'),
+        Mark::Thin => ("─", '.'),
+        Mark::Dashed => ("╌╌", '-'),
+        Mark::Dotted => ("┈┈", '\''),
+        Mark::Shape(_) | Mark::Linked(_) | Mark::DashLinked(_) => {
+            let sign = sign.unwrap_or(SIGNS[0]);
+            let legend = sign.to_string();
+            return Sight { role, marker: Marker::Custom(sign), sign: None, legend };
         }
-    }
-}
-
-/// The sign of the `at`-th of many.
-fn sign(at: usize) -> char {
-    let letter = || char::from(LETTERS[(at - SIGNS.len()) % LETTERS.len()]);
-    SIGNS.get(at).copied().unwrap_or_else(letter)
-}
-
-/// The sign of one of many whose lines colours alone would tell apart.
-fn sign_of(series: &Series) -> Option<char> {
-    match (series.role, series.mark) {
-        (Meaning::One(at), Mark::Line | Mark::Dashed | Mark::Dotted) => Some(sign(at)),
-        _ => None,
-    }
-}
-
-fn text_of(sign: Option<char>) -> String {
-    sign.map_or_else(String::new, String::from)
+    };
+    let whose = sign.map_or_else(String::new, String::from);
+    let (marker, line) = if glyphs == Glyphs::Braille {
+        (Marker::Braille, fine.to_owned())
+    } else {
+        (Marker::Custom(coarse), coarse.to_string())
+    };
+    Sight { role, marker, sign, legend: line + &whose }
 }
 
 /// The legend's entries, line by line.
 fn legend(pen: &Pen<'_>, series: &[Series]) -> Vec<Vec<(String, Role)>> {
     let mut lines: Vec<Vec<(String, Role)>> = vec![Vec::new()];
     let mut used = 0;
-    for (at, one) in series.iter().enumerate() {
-        let (role, _, sign) = look_of(one, at, pen.look.glyphs);
-        let entry = cut(&format!("{sign} {}", one.label), usize::from(pen.width()));
+    for (one, Sight { role, legend, .. }) in series.iter().zip(sights(series, pen.look.glyphs)) {
+        let entry = cut(&format!("{legend} {}", one.label), usize::from(pen.width()));
         let length = columns(&entry) + 3;
         if used > 0 && used + length > pen.width() {
             lines.push(Vec::new());
@@ -136,7 +164,10 @@ fn legend(pen: &Pen<'_>, series: &[Series]) -> Vec<Vec<(String, Role)>> {
         }
     }
     // More would leave no room for the picture.
-    lines.truncate(4);
+    if lines.len() > MOST_LINES {
+        let left = lines.drain(MOST_LINES - 1..).map(|line| line.len()).sum::<usize>();
+        lines.push(vec![(format!("and {left} more, which the page and the data name"), Role::Dim)]);
+    }
     lines
 }
 
@@ -157,8 +188,8 @@ fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
     };
     // What is drawn later covers what was before: spreads lie below, signs above.
     let (mut spreads, mut drawn, mut signs) = (Vec::new(), Vec::<Curve>::new(), Vec::new());
-    for (at, one) in series.iter().enumerate() {
-        let (role, marker, _) = look_of(one, at, pen.look.glyphs);
+    let sights = sights(series, pen.look.glyphs);
+    for (at, (one, Sight { role, marker, sign, .. })) in series.iter().zip(sights).enumerate() {
         let is_line = matches!(one.mark, Mark::Line | Mark::Thin);
         for piece in one.pieces() {
             let (kind, points) = match one.mark {
@@ -169,7 +200,7 @@ fn lines(pen: &mut Pen<'_>, figure: &Figure, series: &[Series]) {
             };
             drawn.push((role, marker, kind, points));
         }
-        if let Some(sign) = sign_of(one) {
+        if let Some(sign) = sign {
             let every = SIGN_EVERY.min(one.points.len()).max(1);
             // One beside the other where lines run together.
             let first = at % SIGNS.len() * every / SIGNS.len();
