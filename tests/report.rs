@@ -403,6 +403,13 @@ fn a_tenth_that_was_tried_from_few_starts_is_left_out() {
     fs::write(&table, &whole[..last]).unwrap();
     let report = json(&desk, "report logs --json");
     assert!(left_out(&report)[0].contains("after 100 % of main have fewer rows"), "{report}");
+    // A row twice counts once, and one that cannot be used costs its tenth alone.
+    let twice = format!("{whole}{}\n", whole.lines().last().unwrap());
+    fs::write(&table, twice.replacen("failed,", "failed,x", 1)).unwrap();
+    let left = left_out(&json(&desk, "report logs --json")).join("; ");
+    assert!(left.contains("1 row of starts that were there already"), "{left}");
+    assert!(left.contains("is not a number") && left.contains("after 10 % of main"), "{left}");
+    assert!(!left.contains("20 %"), "{left}");
     fs::write(&table, "").unwrap();
     let report = json(&desk, "report logs --json");
     assert!(left_out(&report)[0].contains("no row that can be used"), "{:?}", left_out(&report));

@@ -221,7 +221,7 @@ impl Recorded {
             }
         };
         let mut seen = BTreeSet::new();
-        let mut bad = None;
+        let (mut bad, mut doubled) = (None, 0);
         for row in rows {
             let row = row.and_then(|row| {
                 let why = "a number is not finite, or the policy is none of a tenth";
@@ -231,7 +231,7 @@ impl Recorded {
                 Ok((percent, row)) if seen.insert((percent, row.episode)) => {
                     self.tenths.push((percent, row));
                 }
-                Ok(_) => {}
+                Ok(_) => doubled += 1,
                 Err(error) => {
                     let (count, _) = bad.get_or_insert((0, error));
                     *count += 1;
@@ -241,6 +241,11 @@ impl Recorded {
         if let Some((count, first)) = bad {
             let rows = counted(count, "row");
             self.leave_out(&path, format!("{rows} left out, the first because: {}", first.why()));
+        }
+        if doubled > 0 {
+            let why =
+                format!("{} of starts that were there already: left out", counted(doubled, "row"));
+            self.leave_out(&path, why);
         }
         self.mind_the_end(&path);
         self.leave_out_short_tenths(&path);
