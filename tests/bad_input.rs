@@ -194,7 +194,7 @@ fn unknown_words_are_told_what_is_known() {
     refuses(&desk, &mouse, &["no mouse", "--operator simulated:average"]);
     refuses(&desk, "run --headless", &["PROFILE"]);
     refuses(&desk, "dance", &["dance"]);
-    refuses(&desk, "run --headless --resume nowhere", &["nowhere", "no session"]);
+    refuses(&desk, "run --headless --resume nowhere", &["nowhere", "no such folder"]);
     refuses(&desk, "run --headless --resume nowhere --operator none", &["--resume", "--operator"]);
 }
 

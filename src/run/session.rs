@@ -205,9 +205,9 @@ impl Session {
     /// When there is none, it is complete, or its files are damaged; they are untouched then.
     pub fn resume(path: &Path, company: &Company) -> Result<Self, RunError> {
         let failed = |error: record::Error| RunError::Usage(error.to_string());
+        let sidecar = record::sidecar_of(path).map_err(failed)?;
         let folder = Folder::open(path).map_err(failed)?;
         // Everything that could be refused is looked at before the folder is touched.
-        let sidecar = record::read_sidecar(&path.join("session.json")).map_err(failed)?;
         let profile =
             Document::from_text("profile_ron of session.json", sidecar.profile_ron.clone())
                 .read()

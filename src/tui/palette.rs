@@ -111,6 +111,7 @@ impl Look {
         if self.glyphs != Glyphs::Ascii {
             return;
         }
+        spell_plus_minus(buffer);
         for cell in &mut buffer.content {
             if !cell.symbol().is_ascii() {
                 let relative = cell.symbol().chars().next().map_or(' ', ascii);
@@ -120,17 +121,36 @@ impl Look {
     }
 }
 
+/// Writes ± as +- where a blank stands beside it: a plus alone would read as a sum.
+fn spell_plus_minus(buffer: &mut Buffer) {
+    let width = usize::from(buffer.area.width);
+    for at in 0..buffer.content.len() {
+        if buffer.content[at].symbol() != "±" {
+            continue;
+        }
+        let is_blank = |at: usize| buffer.content[at].symbol() == " ";
+        let (plus, minus) = if (at + 1) % width != 0 && is_blank(at + 1) {
+            (at, at + 1)
+        } else if at % width != 0 && is_blank(at - 1) {
+            (at - 1, at)
+        } else {
+            continue;
+        };
+        buffer.content[plus].set_char('+');
+        buffer.content[minus].set_char('-');
+    }
+}
+
 /// The 7-bit character that stands for `glyph`.
 fn ascii(glyph: char) -> char {
     match glyph {
         c if c.is_ascii() => c,
         '─' | '━' | '–' | '−' | '▃' => '-',
         '│' | '┃' | '▌' | '▐' | '┤' | '├' => '|',
-        '┌' | '┐' | '└' | '┘' | '╭' | '╮' | '╯' | '╰' | '┼' | '┬' | '┴' | '▅' => {
+        '┌' | '┐' | '└' | '┘' | '╭' | '╮' | '╯' | '╰' | '┼' | '┬' | '┴' | '▅' | '±' => {
             '+'
         }
-        // A plus would read as a sum.
-        '±' | '…' => '~',
+        '…' => '~',
         '█' | '▉' | '▊' | '▋' | '▇' | '╔' | '╗' | '╚' | '╝' | '║' => '#',
         '▓' | '▒' | '┊' => ':',
         '░' | '·' | '▁' => '.',
@@ -172,6 +192,18 @@ mod tests {
         assert_ne!(style(Role::You), style(Role::Robot));
         assert_ne!(style(Role::You), style(Role::Motor));
         assert_ne!(style(Role::Robot), style(Role::Motor));
+    }
+
+    #[test]
+    fn plus_minus_is_spelt_where_there_is_room() {
+        let finished = |line: &str| {
+            let mut buffer = Buffer::with_lines([line]);
+            Look { glyphs: Glyphs::Ascii, ..Look::default() }.finish(&mut buffer);
+            buffer.content.iter().map(|cell| cell.symbol().to_owned()).collect::<String>()
+        };
+        assert_eq!(finished("2.1 s ± 0.4 s"), "2.1 s +-0.4 s");
+        assert_eq!(finished(" ±17 cm"), "+-17 cm");
+        assert_eq!(finished("(±10)±"), "(+10)+");
     }
 
     #[test]

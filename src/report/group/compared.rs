@@ -195,27 +195,8 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
         sentences.push(few.to_owned());
     }
     sentences.extend(misfits);
-    let (few, paired) = match pairing {
-        Pairing::None | Pairing::Unclear => ("subjects are dealt to the modes", ""),
-        Pairing::Subjects => ("differences of subjects change their sign", ", paired by subject"),
-        Pairing::Seeds => ("differences of seeds change their sign", ", paired by seed"),
-    };
-    let less = if yard.more_is_better { "" } else { " Less is better." };
-    let sentence = format!(
-        "Simultaneous against sequential mode{paired}: means ± standard deviation over subjects, \
-         medians, the difference of means with its 95 % interval (BCa bootstrap; from {LEAST_VALUES} \
-         subjects on, of fewer it would be too narrow), Hedges' g, and the chance p of such a \
-         difference if the mode did not matter. With few subjects p counts every way in which {few}; \
-         none of the rows is corrected for the others.{less}"
-    );
     let table = Table {
-        caption: Caption {
-            name: format!("{}-comparison", group.stem),
-            thesis: String::new(),
-            title: "Simultaneous against sequential".to_owned(),
-            preset: group.preset.clone(),
-            sentence,
-        },
+        caption: caption(group, pairing),
         columns: [
             "measure",
             "simultaneous",
@@ -232,6 +213,30 @@ pub(super) fn table(group: &Group<'_>) -> Compared {
         rows,
     };
     Compared { table: Some(table), sentences, contrasts }
+}
+
+/// What the table of a comparison is called and says.
+fn caption(group: &Group<'_>, pairing: Pairing) -> Caption {
+    let (few, paired) = match pairing {
+        Pairing::None | Pairing::Unclear => ("subjects are dealt to the modes", ""),
+        Pairing::Subjects => ("differences of subjects change their sign", ", paired by subject"),
+        Pairing::Seeds => ("differences of seeds change their sign", ", paired by seed"),
+    };
+    let less = if yardstick(group.task).more_is_better { "" } else { " Less is better." };
+    let sentence = format!(
+        "Simultaneous against sequential mode{paired}: means ± standard deviation over subjects, \
+         medians, the difference of means with its 95 % interval (BCa bootstrap; from {LEAST_VALUES} \
+         subjects on, of fewer it would be too narrow), Hedges' g, and the chance p of such a \
+         difference if the mode did not matter. With few subjects p counts every way in which {few}; \
+         none of the rows is corrected for the others.{less}"
+    );
+    Caption {
+        name: format!("{}-comparison", group.stem),
+        thesis: String::new(),
+        title: "Simultaneous against sequential".to_owned(),
+        preset: group.preset.clone(),
+        sentence,
+    }
 }
 
 fn row(
