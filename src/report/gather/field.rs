@@ -17,7 +17,7 @@ pub struct Field {
 type Shape = (Vec<f64>, Vec<f64>);
 
 /// Directions in which an outline is first traced.
-const DIRECTIONS: u32 = 24;
+const DIRECTIONS: u32 = 36;
 
 /// Of neighbouring points further apart than this, in lengths that matter, the direction between
 /// is traced too: the tips of a long thin field have few directions.
