@@ -45,6 +45,14 @@ fn thesis(report: &Value) -> Vec<String> {
     items.map(|item| item["thesis"].as_str().unwrap().to_owned()).collect()
 }
 
+/// What was left out: file and reason.
+fn left_out(report: &Value) -> Vec<String> {
+    let each = |left: &Value| {
+        format!("{}: {}", left["path"].as_str().unwrap(), left["why"].as_str().unwrap())
+    };
+    report["left_out"].as_array().unwrap().iter().map(each).collect()
+}
+
 fn copy(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in fs::read_dir(from).unwrap() {
@@ -262,14 +270,7 @@ fn what_cannot_be_used_is_named_and_the_rest_reported() {
     fs::create_dir_all(desk.at("other/src")).unwrap();
     fs::write(desk.at("other/src/main.c"), "int main;").unwrap();
     let report = json(&desk, "report logs logs/empty other nowhere --json");
-    let left: Vec<String> = report["left_out"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|left| {
-            format!("{}: {}", left["path"].as_str().unwrap(), left["why"].as_str().unwrap())
-        })
-        .collect();
+    let left = left_out(&report);
     for (place, why) in [
         ("NEWER", "update coadapt"),
         ("HEADLESS", "session.json is missing"),
@@ -317,14 +318,6 @@ fn a_session_that_was_cut_is_shown_but_counts_in_no_group() {
     assert_eq!(sections.len(), 1, "{sections:?}");
     assert!(sections[0]["notes"].to_string().contains("counts in no group"));
     assert!(thesis(&report).contains(&"figure 14".to_owned()));
-}
-
-/// What was left out: file and reason.
-fn left_out(report: &Value) -> Vec<String> {
-    let each = |left: &Value| {
-        format!("{}: {}", left["path"].as_str().unwrap(), left["why"].as_str().unwrap())
-    };
-    report["left_out"].as_array().unwrap().iter().map(each).collect()
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use coadapt::clock::{Clock, VirtualClock, WallClock};
-use coadapt::control::snapshot::{Command, Watcher};
+use coadapt::control::snapshot::Command;
 use coadapt::operator::mouse::Pointer;
 use coadapt::operator::terminal::{Hands, Params};
 use coadapt::profile::Order;
@@ -268,7 +268,13 @@ fn a_resumed_session_is_the_same_once_more() {
     let session = Session::begin(&order, &Company::Headless).unwrap();
     let folder = session.folder().to_owned();
     let watcher = session.watcher.clone();
-    session.run(&mut Busy { time: VirtualClock::default(), watcher }, || None).unwrap();
+    let leave_in_the_middle = move || {
+        let is_there = |m: Moment| m.phase == Phase::Main && m.rollout >= 2 && m.step > 50;
+        if watcher.look().stage.moment().is_some_and(is_there) {
+            watcher.insist(Command::Abort("enough".to_owned()));
+        }
+    };
+    session.run(&mut attended(leave_in_the_middle), || None).unwrap();
     assert!(fs::read_to_string(folder.join("episodes.csv")).unwrap().contains("aborted"));
     assert_verified(&desk, &folder);
     let session = Session::resume(&folder, &Company::Headless).unwrap();
@@ -278,28 +284,29 @@ fn a_resumed_session_is_the_same_once_more() {
     assert_verified(&desk, &folder);
 }
 
-/// The time of a person who leaves in the middle of a rollout of main.
-struct Busy {
+/// Virtual time, at each moment of which a person may do something.
+struct Attended<F> {
     time: VirtualClock,
-    watcher: Watcher,
+    at_each: F,
 }
 
-impl Clock for Busy {
+impl<F: FnMut() + Send> Clock for Attended<F> {
     fn now(&self) -> Seconds {
         self.time.now()
     }
 
     fn wait_until(&mut self, deadline: Seconds) -> Seconds {
-        let is_in_the_middle = |m: Moment| m.phase == Phase::Main && m.rollout >= 2 && m.step > 50;
-        if self.watcher.look().stage.moment().is_some_and(is_in_the_middle) {
-            self.watcher.insist(Command::Abort("enough".to_owned()));
-        }
+        (self.at_each)();
         self.time.wait_until(deadline)
     }
 
     fn is_wall(&self) -> bool {
-        self.time.is_wall()
+        false
     }
+}
+
+fn attended<F: FnMut() + Send>(at_each: F) -> Attended<F> {
+    Attended { time: VirtualClock::default(), at_each }
 }
 
 #[test]
@@ -326,9 +333,20 @@ fn a_session_with_pauses_stops_and_discarded_rollouts_is_the_same_once_more() {
     };
     let session = Session::begin(&order, &Company::Attended(keys)).unwrap();
     let (folder, watcher) = (session.folder().to_owned(), session.watcher.clone());
-    session
-        .run(&mut Impatient { time: VirtualClock::default(), watcher, turn: 0 }, || None)
-        .unwrap();
+    let mut turn = 0;
+    // Who reads nothing, and throws away, stops, pauses or leaves alone one rollout after the other.
+    let be_impatient = move || match watcher.look().stage {
+        Stage::Running(moment) if moment.step == 21 && turn < 40 => {
+            turn += 1;
+            let wishes = [None, Some(Command::Discard), Some(Command::Pause), Some(Command::Stop)];
+            wishes[turn % 4].clone().map(|wish| watcher.ask(wish));
+        }
+        Stage::Instruction(_) | Stage::Break { .. } | Stage::Paused(_) | Stage::Stopped(_) => {
+            watcher.ask(Command::Begin);
+        }
+        _ => {}
+    };
+    session.run(&mut attended(be_impatient), || None).unwrap();
     let episodes = fs::read_to_string(folder.join("episodes.csv")).unwrap();
     let discarded = |phase: &str| {
         let of_phase = episodes.lines().filter(|row| row.starts_with(phase));
@@ -338,40 +356,6 @@ fn a_session_with_pauses_stops_and_discarded_rollouts_is_the_same_once_more() {
     let events = fs::read_to_string(folder.join("events.csv")).unwrap();
     assert!(events.contains("pause") && events.contains("stop"), "{events}");
     assert_verified(&desk, &folder);
-}
-
-/// The time of a person who reads nothing, and throws away, stops, pauses or leaves alone one
-/// rollout after the other.
-struct Impatient {
-    time: VirtualClock,
-    watcher: Watcher,
-    turn: usize,
-}
-
-impl Clock for Impatient {
-    fn now(&self) -> Seconds {
-        self.time.now()
-    }
-
-    fn wait_until(&mut self, deadline: Seconds) -> Seconds {
-        match self.watcher.look().stage {
-            Stage::Running(moment) if moment.step == 21 && self.turn < 40 => {
-                self.turn += 1;
-                let wishes =
-                    [None, Some(Command::Discard), Some(Command::Pause), Some(Command::Stop)];
-                wishes[self.turn % 4].clone().map(|wish| self.watcher.ask(wish));
-            }
-            Stage::Instruction(_) | Stage::Break { .. } | Stage::Paused(_) | Stage::Stopped(_) => {
-                self.watcher.ask(Command::Begin);
-            }
-            _ => {}
-        }
-        self.time.wait_until(deadline)
-    }
-
-    fn is_wall(&self) -> bool {
-        false
-    }
 }
 
 #[test]

@@ -84,8 +84,7 @@ impl Series {
 
     /// The unbroken parts of it.
     pub fn pieces(&self) -> impl Iterator<Item = &[(f64, f64)]> {
-        let is_whole = |&(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
-        self.points.split(move |point| !is_whole(point)).filter(|piece| !piece.is_empty())
+        self.pieces_within().into_iter().map(|(piece, _)| piece)
     }
 
     /// The unbroken parts of it, each with its part of the spread, where there is one.

@@ -113,16 +113,14 @@ fn look(folder: &Path, depth: u32, seen: &mut BTreeSet<PathBuf>, found: &mut Fou
 /// Whether something was recorded in `folder`, which stays as it is, or it is a part of a study.
 #[must_use]
 pub fn holds_records(folder: &Path) -> bool {
-    let is_of_a_study = || matches!(folder.parent().map(kind), Some(Ok(Kind::Study)));
-    !matches!(kind(folder), Ok(Kind::Shelf(_)) | Err(_)) || is_of_a_study()
+    let is_of_a_study = || matches!(folder.parent().map(recorded), Some(Ok(Some(Kind::Study))));
+    matches!(recorded(folder), Ok(Some(_))) || is_of_a_study()
 }
 
 fn kind(folder: &Path) -> io::Result<Kind> {
-    let has = |name: &str| match fs::metadata(folder.join(name)) {
-        Ok(there) => Ok(there.is_file()),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
-        Err(error) => Err(error),
-    };
+    if let Some(kind) = recorded(folder)? {
+        return Ok(kind);
+    }
     let mut below = Vec::new();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
@@ -132,14 +130,26 @@ fn kind(folder: &Path) -> io::Result<Kind> {
         }
     }
     below.sort();
+    Ok(Kind::Shelf(below))
+}
+
+/// What was recorded in `folder`, if anything, by the names of its files.
+fn recorded(folder: &Path) -> io::Result<Option<Kind>> {
+    let has = |name: &str| match fs::metadata(folder.join(name)) {
+        Ok(there) => Ok(there.is_file()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    };
     Ok(match () {
-        () if has("session.json")? => Kind::Session,
-        () if has("study.json")? => Kind::Study,
+        () if has("session.json")? => Some(Kind::Session),
+        () if has("study.json")? => Some(Kind::Study),
         () if has("steps.csv")? || has("episodes.csv")? || has("evaluation.csv")? => {
-            Kind::Headless("session.json")
+            Some(Kind::Headless("session.json"))
         }
-        () if has("results.csv")? && folder.join("runs").is_dir() => Kind::Headless("study.json"),
-        () => Kind::Shelf(below),
+        () if has("results.csv")? && folder.join("runs").is_dir() => {
+            Some(Kind::Headless("study.json"))
+        }
+        () => None,
     })
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{TEXT, WIDTH, colour, dashes};
-use crate::report::figure::{Mark, Series, real};
+use crate::report::figure::{Mark, SHAPES, Series, real};
 
 /// Height of a row.
 const ROW: f64 = 20.0;
@@ -58,7 +58,7 @@ fn sample(svg: &mut String, series: &Series, x: f64, y: f64) {
                 y - 8.0
             );
         }
-        let _ = match shape % 6 {
+        let _ = match shape % SHAPES {
             0 => write!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{ink}\"/>"),
             1 => path(svg, &ink, x, y, "m0 -4.5l4 8h-8z", true),
             2 => path(svg, &ink, x, y, "m-3.5 -3.5h7v7h-7z", true),
